@@ -30,6 +30,7 @@ from nlsdesign.components import (
     Inertia,
     OneSidedCam,
     RollerCam,
+    RollingPair,
     StatedRate,
     TwoSidedCam,
 )
@@ -168,6 +169,19 @@ def line() -> Published:
     return Published(
         "eth_line", "ETH, line of 0.25 N·m over ±90°", {"both": target}, coil, 1.0, radius, force,
         "exact by its energy", source,
+    )  # fmt: skip
+
+
+def fall() -> Published:
+    """A jump to 0.125 N·m at angle zero, then a fall to nothing at 90°."""
+    angles = np.radians([0.0, 0.2, 90.0])
+    target = TabulatedTorque(angles=tuple(angles), torques=(0.0, 0.125, 0.0))
+    coil = line().coil
+    assert isinstance(coil, ExtensionCoil)
+    radius, force = rolling_pair(target, coil, 1.0)
+    return Published(
+        "eth_fall", "ETH, jump to 0.125 N·m, falls over ±90°", {"both": target}, coil, 1.0, radius, force,
+        "exact by its energy", "Wu and Mintchev 2024, Step1_SpringSelector.m of 19 Feb 2025, Example 4",
     )  # fmt: skip
 
 
@@ -351,8 +365,8 @@ def compression_coil(source: str) -> CompressionCoil:
 
 
 def rolling_pairs() -> list[Ours]:
-    """Answer ETH: a cable for the line, a roller for the hills."""
-    straight, curved = line(), hills()
+    """Answer ETH: a cable for the line, a roller and a pair as theirs for the hills, a pair for the fall."""
+    straight, curved, falling = line(), hills(), fall()
     return [
         one_design(
             straight, "cable", "cable through the centre", TwoSidedCam,
@@ -362,6 +376,14 @@ def rolling_pairs() -> list[Ours]:
             curved, "roller", "roller", RollerCam,
             "Smaller. Not better at angle zero: their curve jumps, and the way of a roller has no corner, so "
             "the jump takes 5° here.",
+        ),
+        one_design(
+            curved, "pair", "pair that rolls", RollingPair,
+            "The same: coil and curve allow one pair where the coil uses all its travel.",
+        ),
+        one_design(
+            falling, "pair", "pair that rolls", RollingPair,
+            "Smaller, with their jump: both cams have a flat facet at angle zero.",
         ),
     ]  # fmt: skip
 
@@ -465,7 +487,7 @@ def designed(
         machine(theirs, theirs.targets[side].last_angle, cam, pretension),
         target=theirs.targets[side],
         free=list(free),
-        keep=keep if cam is RollerCam else [EDGE, *keep],
+        keep=keep if cam in (RollerCam, RollingPair) else [EDGE, *keep],
         goals=GOALS,
         settings=DesignSettings(starts=2, draws=0, look_for_size_ranges=False, look_for_remedies=False),
     )
@@ -474,7 +496,10 @@ def designed(
 def machine(theirs: Published, last: float, cam: Callable[..., Cam], pretension: nls.Quantity) -> Assembly:
     """Return a body that turns a cam on their coil; inertias do not matter at rest."""
     numbers = {"last_angle": nls.quantity(last, "rad", source=theirs.source), "elements": theirs.elements}
-    if cam is RollerCam:
+    if cam is RollingPair:
+        numbers["base_distance"] = nls.quantity(40e-3, "m", source="a start for the design")
+        arms = (0.0, *[1.0] * 19)
+    elif cam is RollerCam:
         michigan = isinstance(theirs.coil, CompressionCoil)
         numbers["roller_radius"] = nls.quantity(
             ROLLER if michigan else 3e-3, "m",

@@ -117,6 +117,7 @@ from .transmission.cam_shapes import AnchoredCam, OneSidedCam
 from .transmission.capstan import CapstanFriction, Guide, WrapProduct
 from .transmission.lopsided_cam import LopsidedCam
 from .transmission.roller_cam import RollerCam, SlidingGuide
+from .transmission.rolling_pair import RollingPair
 from .transmission.stretchy_cable import StretchyCable
 from .transmission.unilateral_cable import Buckling, InextensibleCable, PullOnly, pull_only
 
@@ -221,6 +222,7 @@ __all__ = [
     "RigidStop",
     "Rising",
     "RollerCam",
+    "RollingPair",
     "Rounded",
     "SampleAndHold",
     "Screw",

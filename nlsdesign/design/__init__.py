@@ -33,11 +33,11 @@ from .drawing.machined_cam import (
     FerruleSeat,
     MachinedCam,
     MachinedOneSidedCam,
-    MachinedRollerCam,
     MachinedTwoSidedCam,
 )
 from .drawing.making import carrying_note as carrying_note
 from .drawing.making import process_of as process_of
+from .drawing.rolling_cam import MachinedPair, MachinedRollerCam
 from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, TaskTarget, job_of, read_job
 from .jobs.job_file import kinds as kinds
@@ -59,6 +59,7 @@ from .optimisation.coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    RoomBetweenPivots,
 )
 from .optimisation.defaults import DesignSettings, safe_limits
 from .optimisation.goals import (
@@ -136,6 +137,7 @@ __all__ = [
     "LimitState",
     "MachinedCam",
     "MachinedOneSidedCam",
+    "MachinedPair",
     "MachinedRollerCam",
     "MachinedTwoSidedCam",
     "MaximumCableTension",
@@ -164,6 +166,7 @@ __all__ = [
     "PowerTorque",
     "PretensionRange",
     "RestLengthRange",
+    "RoomBetweenPivots",
     "RubberStock",
     "SmoothContour",
     "Spread",

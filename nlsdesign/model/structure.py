@@ -20,6 +20,7 @@ from ..components.transmission.cam import Cable, Cam
 from ..components.transmission.cam_drive import Through
 from ..components.transmission.capstan import CapstanFriction
 from ..components.transmission.roller_cam import RollerCam
+from ..components.transmission.rolling_pair import RollingPair
 from .gear_train import trains
 from .readings import ReadingNames
 
@@ -141,12 +142,13 @@ class CableNames:
 
 
 @dataclass(frozen=True)
-class RollerNames:
-    """The numbers of a roller that runs on a cam, all parameters."""
+class RollingNames:
+    """The numbers of what rolls on a cam, a roller or another cam, all parameters."""
 
-    radius: str
-    base_radius: str  # distance of its centre from the axis at angle zero
-    guide_friction: str | None  # coefficient of friction of its guide; None where it is not declared
+    what: str  # in words
+    base: str  # at angle zero distance of the roller's centre from the axis, or of the two pivots
+    radius: str | None = None  # of the roller; None for a pair
+    guide_friction: str | None = None  # coefficient of friction of its guide; None where it is not declared
 
 
 @dataclass(frozen=True)
@@ -180,7 +182,7 @@ class CamNames:
     # friction
     guides: tuple[tuple[str, ...], ...] = ()
     coils: tuple[CoilNames, ...] = ()  # the coils in it
-    roller: RollerNames | None = None  # the roller that runs on the cam; None for a cam with a cable
+    rolling: RollingNames | None = None  # what rolls on the cam; None for a cam with a cable
     # back_last_angle: parameter: where the contour for negative angles ends; None where it is no other one
     back_last_angle: str | None = None
 
@@ -363,10 +365,12 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
     (own, behind), cam = part.behind, f"{path}.cam"
     element, inner, of_cam = f"{path}.{own}", behind.domain, part.cam.parameters()
     pieces = dict(walk(behind, element))
-    roller = None
+    rolling = None
     if isinstance(part.cam, RollerCam):
         friction = f"{cam}.guide_friction" if part.cam.needs_rate else None
-        roller = RollerNames(f"{cam}.roller_radius", f"{cam}.base_radius", friction)
+        rolling = RollingNames("a roller", f"{cam}.base_radius", f"{cam}.roller_radius", friction)
+    if isinstance(part.cam, RollingPair):
+        rolling = RollingNames("another cam that rolls on it", f"{cam}.base_distance")
     return CamNames(
         name=cam,
         drive=path,
@@ -396,7 +400,7 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
             if isinstance(p, CapstanFriction)
         ),
         coils=tuple(_coil(name, p) for name, p in pieces.items() if isinstance(p, Coil)),
-        roller=roller,
+        rolling=rolling,
         back_last_angle=f"{cam}.back_last_angle" if "back_last_angle" in of_cam else None,
     )
 

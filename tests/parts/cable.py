@@ -17,6 +17,7 @@ from nlsdesign.components import (
     OneSidedCam,
     Part,
     RollerCam,
+    RollingPair,
     SampleAndHold,
     SlidingGuide,
     Spring,
@@ -55,6 +56,7 @@ EXAMPLES: tuple[Part, ...] = (
     AnchoredCam(support=ROW, last_direction=1.2, anchor_distance=0.035, cable=CABLE),
     RollerCam(lever_arm=ROLLED, last_angle=1.2, base_radius=0.02, roller_radius=0.004),
     RollerCam(lever_arm=ROLLED, last_angle=1.2, base_radius=0.02, roller_radius=0.004, guide=GUIDE),
+    RollingPair(lever_arm=ROLLED, last_angle=1.2, base_distance=0.07),
     CapstanFriction(
         members=(("rubber", Spring(stiffness=2500.0)),), guide=Guide(friction=0.15, wrap_angle=1.57)
     ),

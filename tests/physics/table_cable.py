@@ -14,6 +14,7 @@ from nlsdesign.components import (
     LossyGear,
     OneSidedCam,
     RollerCam,
+    RollingPair,
     SampleAndHold,
     Tachometer,
     TorqueSensor,
@@ -115,6 +116,11 @@ ROWS: tuple[Row, ...] = (
         RollerCam, "N·F·dx/dθ = moment of the force at the contact",
         ("law", "balance of the follower and the cam at their point of contact"),
         "test_roller_cam.py::test_the_torque_balances_the_follower_at_its_point_of_contact",
+    ),
+    Row(
+        RollingPair, "N·F·dd/dθ = moment of the element about the contact",
+        ("law", "pair rolled without slip by integrating the motion of one profile on the other"),
+        "test_rolling_pair.py::test_a_profile_that_rolls_on_its_mirror_image_moves_its_pivot_as_the_law_says",
     ),
     Row(
         CapstanFriction, "loop area k·E²·sinh(µφ)", ("simulation", "closed form"),

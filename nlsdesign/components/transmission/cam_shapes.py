@@ -1,4 +1,7 @@
-"""More cams: one-sided, and two-sided given by its made contour with the anchor at a finite distance."""
+"""More cams: one-sided, and two-sided given by its made contour with the anchor at a finite distance.
+
+Base of cams without a cable, whose lever arm may be of either sign.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from ...foundation.quantity import Quantity
 from ...foundation.symbolic import Expression, symbol, uniform_spline, uniform_spline_integral
 from ..core.element import Scope
 from ..core.part import parameter
+from ..core.part_numbers import NotDeclared, Reading, read_as
 from .cam import Cam, side_of
 from .stretchy_cable import newton_root
 
@@ -160,6 +164,34 @@ class AnchoredCam(Cam):
         """Return h(θ) = dδ/dθ."""
         on_side, slope = side_of(angle, scope.parameter("changeover"))
         return self._support(scope, self._direction(scope, on_side)) * slope
+
+
+@dataclass(frozen=True, kw_only=True)
+class MirroredCam(Cam):
+    """Base of cams without a cable, with two sides that are mirror images: δ(θ) = ∫₀^q H of a spline H."""
+
+    lever_arm: Quantity = parameter(
+        "m", "control values of the lever arm over the angle", minimum=-1.0, maximum=1.0, row=True
+    )
+    last_angle: Quantity = parameter("rad", "angle at the end of the contour", minimum=0.01, maximum=3.0)
+    changeover: Quantity = parameter(
+        "rad", "angle over which the lever arm changes sides", minimum=1e-6, maximum=0.5, default=1e-3
+    )
+    cable: Reading = read_as(NotDeclared, default=NotDeclared())
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        check_row("lever_arm", self.lever_arm)
+
+    def extension(self, scope: Scope, angle: Expression) -> Expression:
+        """Return δ(θ) = ∫₀^q H."""
+        on_side, _ = side_of(angle, scope.parameter("changeover"))
+        return held_integral(scope.row("lever_arm"), scope.parameter("last_angle"), on_side)
+
+    def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
+        """Return h(θ) = dδ/dθ."""
+        on_side, slope = side_of(angle, scope.parameter("changeover"))
+        return held_spline(scope.row("lever_arm"), scope.parameter("last_angle"), on_side) * slope
 
 
 def held_spline(row: list[Expression], end: Expression, at: Expression) -> Expression:

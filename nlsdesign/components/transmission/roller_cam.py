@@ -12,8 +12,7 @@ from ...foundation.symbolic import Expression
 from ..core.element import Scope
 from ..core.part import parameter
 from ..core.part_numbers import NotDeclared, Reading, read_as
-from .cam import Cam, side_of
-from .cam_shapes import check_row, held_integral, held_spline
+from .cam_shapes import MirroredCam
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class SlidingGuide(Reading):
 
 
 @dataclass(frozen=True, kw_only=True)
-class RollerCam(Cam):
+class RollerCam(MirroredCam):
     """Cam on which a roller runs that slides in line with the axis, pressed on by the element: h may be < 0.
 
     The roller's centre has the distance ρ(θ) = ρ₀ + δ(θ) from the axis, outside the cam, whose two sides are
@@ -62,23 +61,14 @@ class RollerCam(Cam):
     0.02
     """
 
-    lever_arm: Quantity = parameter(
-        "m", "control values of the lever arm over the angle", minimum=-1.0, maximum=1.0, row=True
-    )
-    last_angle: Quantity = parameter("rad", "angle at the end of the contour", minimum=0.01, maximum=3.0)
     base_radius: Quantity = parameter(
         "m", "distance of the roller's centre from the axis at angle zero", minimum=1e-3, maximum=2.0
     )
     roller_radius: Quantity = parameter("m", "radius of the roller", minimum=1e-4, maximum=0.5)
-    changeover: Quantity = parameter(
-        "rad", "angle over which the roller changes sides", minimum=1e-6, maximum=0.5, default=1e-3
-    )
-    cable: Reading = read_as(NotDeclared, default=NotDeclared())
     guide: Reading = read_as(NotDeclared, SlidingGuide, default=NotDeclared())
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_row("lever_arm", self.lever_arm)
         if self.base_radius.number <= self.roller_radius.number:
             raise ValueRangeError(
                 f"base_radius = {self.base_radius}",
@@ -98,13 +88,3 @@ class RollerCam(Cam):
         slope = ca.fabs(arm) / (scope.parameter("base_radius") + lift[0])
         lifted = ca.tanh(lift[1] / scope.parameter("guide_creep_speed"))
         return 1 / (1 - scope.parameter("guide_friction") * slope * lifted)
-
-    def extension(self, scope: Scope, angle: Expression) -> Expression:
-        """Return δ(θ) = ∫₀^q H."""
-        on_side, _ = side_of(angle, scope.parameter("changeover"))
-        return held_integral(scope.row("lever_arm"), scope.parameter("last_angle"), on_side)
-
-    def lever_arm_at(self, scope: Scope, angle: Expression) -> Expression:
-        """Return h(θ) = dδ/dθ."""
-        on_side, slope = side_of(angle, scope.parameter("changeover"))
-        return held_spline(scope.row("lever_arm"), scope.parameter("last_angle"), on_side) * slope

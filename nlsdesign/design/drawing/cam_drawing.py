@@ -7,8 +7,9 @@ SVG of a cam at scale 1:1, with true arcs.
 
 DXF of the year 2000 with units: closed edges of lines and arcs, holes, axis, cable and text on layers.
 
-Layers: ``EDGE`` and ``BASE`` are cut, ``HOLES`` drilled; ``CENTRE``, ``CABLE``, ``PITCH`` (way of a roller),
-``ROLLER``, ``CONTOUR`` and ``TEXT`` are for reading. Files are the same for the same part: they hold no date.
+Layers: ``EDGE`` and ``BASE`` are cut, ``HOLES`` drilled; ``CENTRE``, ``CABLE``, ``PITCH`` (way of a roller,
+or of the other pivot), ``ROLLER``, ``PARTNER`` (cam that rolls on this one), ``CONTOUR`` and ``TEXT`` are
+for reading. Files are the same for the same part: they hold no date.
 
 STEP of a cam as a solid, through Open CASCADE: an extra, because that library takes 380 MB of disk.
 """
@@ -33,7 +34,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ExportError, ValueRangeError, missing_library, unknown_name
 from ...foundation.quantity import MM, Quantity
 from ...foundation.text_files import write_text
-from ..statics.contour import Contour, RollerContour, turn
+from ..statics.contour import Contour, PairContour, RollerContour, turn
 from .arc_path import ArcPath
 from .cam_part import CamPart
 from .machined_cam import MachinedCam
@@ -141,6 +142,7 @@ _LAYERS = {
     "CONTOUR": (3, "CONTINUOUS"),
     "PITCH": (3, "CENTER"),
     "ROLLER": (6, "CONTINUOUS"),
+    "PARTNER": (6, "CONTINUOUS"),
     "TEXT": (8, "CONTINUOUS"),
 }
 _DASHES = (12.0, 8.0, -1.5, 1.0, -1.5)
@@ -162,12 +164,13 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
         x, y = (_rounded(value) for value in roller.centre)
         space.add_circle((x, y), _rounded(roller.diameter / 2.0), dxfattribs={"layer": "ROLLER"})
     for cable in part.cables:
-        _add_path(document, cable, "PITCH" if part.rollers else "CABLE")
+        _add_path(document, cable, "PITCH" if part.rolls else "CABLE")
+    for partner in part.partners:
+        _add_path(document, partner, "PARTNER")
     _add_axes(document, part.outermost)
-    radius, thickness = (f"{MM * part.number(n):.4g} mm" for n in (f"{part.counterpart}_radius", "thickness"))
     lines = [
         "Cam, machined edge; millimetres, 1:1",
-        f"for a {part.counterpart} of radius {radius}, plate {thickness}",
+        f"for {part.size_of_counterpart}, plate {MM * part.number('thickness'):.4g} mm",
         f"arcs within {1e6 * part.number('edge_deviation'):.2g} um of the exact edge",
     ]
     if "groove_depth" in part.numbers:
@@ -257,7 +260,7 @@ _TEXT = 2.2
 
 def part_svg(part: CamPart, *, note: str = "") -> str:
     """Return a cam as it is made, at scale 1:1, its cable at angle zero and at both ends of the contour."""
-    sizes = [float(np.abs(cable.points).max()) for cable in part.cables]
+    sizes = [float(np.abs(cable.points).max()) for cable in (*part.cables, *part.partners)]
     sizes += [float(np.abs(each.centre).max()) + each.diameter / 2.0 for each in part.rollers]
     reach = 1.12 * MM * max(part.outermost, *sizes)
     body = []
@@ -280,13 +283,11 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
     body += [_circle(each.centre[0], each.centre[1], each.diameter / 2.0, look) for each in part.rollers]
     body += [
         f'<path class="cable" d="{path_data(cable)}" stroke="#b03020" stroke-width="0.1"/>'
-        for cable in part.cables
+        for cable in (*part.cables, *part.partners)
     ]
     body.append('<path d="M -1.5 0 H 1.5 M 0 -1.5 V 1.5" stroke="#202020" stroke-width="0.08"/>')
     text = (
-        f"Machined edge for a {part.counterpart} of radius "
-        f"{MM * part.number(f'{part.counterpart}_radius'):.4g} mm, "
-        f"plate {MM * part.number('thickness'):.4g} mm; mm, 1:1"
+        f"Machined edge for {part.size_of_counterpart}, plate {MM * part.number('thickness'):.4g} mm; mm, 1:1"
     )
     return page(reach, body, lines=[text, note])
 
@@ -465,7 +466,7 @@ def edge_csv(part: CamPart, *, note: str = "") -> str:
     head = [
         "# cam, machined edge; lengths in mm, axis at (0, 0), cable at angle zero along x",
         "# a row without a radius is a straight line; a positive radius turns to the left",
-        f"# {part.counterpart} radius {part.number(f'{part.counterpart}_radius') * MM:.6g} mm is taken off",
+        f"# for {part.size_of_counterpart}" + ("" if part.partners else ", which is taken off"),
         f"# {note}",
         "outline,start_x_mm,start_y_mm,end_x_mm,end_y_mm,radius_mm,centre_x_mm,centre_y_mm",
     ]
@@ -491,6 +492,8 @@ def csv_text(contour: Contour, *, note: str = "", cable_radius: float = 0.0) -> 
     )
     what = f"cable radius {cable_radius * MM:.6g} mm is taken off, "
     what += f"anchor distance {contour.anchor_distance * MM:.6g} mm"
+    if isinstance(contour, PairContour):
+        what = f"edge that rolls on its mirror image; pivots {contour.centre_radii[0] * MM:.6g} mm apart"
     if isinstance(contour, RollerContour):
         what = f"centre of a roller of radius {contour.roller_radius * MM:.6g} mm; radius of curvature: edge"
     head = [

@@ -42,7 +42,9 @@ Lips = tuple[LipEdge, LipEdge]
 
 
 @remembered(8)
-def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> LipEdge:
+def lip_edge(
+    contour: Contour, cable_radius: float, *, over_travel: float, accuracy: float = ACCURACY
+) -> LipEdge:
     """Return the edge on which a cable has its centre line on the contour.
 
     Beyond the last angle the edge goes on as an arc with the last radius of curvature.
@@ -73,7 +75,7 @@ def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> Li
         error = float(np.max(np.abs(distance)))
         return path, error if np.all(path.bulges[:2] < 0.0) else math.inf
 
-    path, deviation = few_arcs(over, directions)
+    path, deviation = few_arcs(over, directions, accuracy)
     last = _run_out_end(contour, over_travel)
     radius = float(contour.radii_of_curvature[-1])
     centre = contour.points[-1] - radius * _normal(directions[-1])
@@ -114,8 +116,10 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
         )
 
 
-def few_arcs(over: Callable[[float, float], tuple[ArcPath, float]], phi: Array) -> tuple[ArcPath, float]:
-    """Return as few biarcs as the accuracy allows, and their deviation.
+def few_arcs(
+    over: Callable[[float, float], tuple[ArcPath, float]], phi: Array, accuracy: float = ACCURACY
+) -> tuple[ArcPath, float]:
+    """Return as few biarcs as an accuracy in m allows, and their deviation.
 
     ``over``: from the ends of a span to its biarc and the deviation of that; ``phi``: nodes along the edge.
     """
@@ -130,7 +134,7 @@ def few_arcs(over: Callable[[float, float], tuple[ArcPath, float]], phi: Array) 
         while good + 1 < bad:
             tried = min(at + step, len(grid) - 1) if bad == len(grid) else (good + bad) // 2
             candidate, error = over(grid[at], grid[tried])
-            if error <= ACCURACY:
+            if error <= accuracy:
                 good, piece, deviation = tried, candidate, error
             else:
                 bad = tried

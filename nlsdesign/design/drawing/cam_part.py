@@ -48,6 +48,9 @@ class CamPart:
     rollers
         Roller at angle zero and at the last angle of either sense, in the frame of the cam; ``cables`` are
         then the way of its centre and the line of the follower.
+    partners
+        Edge at angle zero of the equal cam that rolls on this one, and its ``holes`` in ``rollers``;
+        ``cables`` are then the way of its pivot and the line of the element.
     """
 
     outlines: tuple[ArcPath, ...]
@@ -57,11 +60,24 @@ class CamPart:
     centre_line: Array
     numbers: Mapping[str, Quantity]
     rollers: tuple[Hole, ...] = ()
+    partners: tuple[ArcPath, ...] = ()
 
     @property
     def counterpart(self) -> str:
-        """What runs on the edge: a cable or a roller."""
-        return "roller" if self.rollers else "cable"
+        """What runs on the edge: a cable, a roller, or an equal cam."""
+        return "equal cam" if self.partners else "roller" if self.rollers else "cable"
+
+    @property
+    def rolls(self) -> bool:
+        """Whether something rolls on the edge."""
+        return bool(self.rollers or self.partners)
+
+    @property
+    def size_of_counterpart(self) -> str:
+        """What the edge is for, in words with its size."""
+        if self.partners:
+            return f"two equal cams, pivots {MM * self.number('pivot_distance'):.4g} mm apart"
+        return f"a {self.counterpart} of radius {MM * self.number(f'{self.counterpart}_radius'):.4g} mm"
 
     @cached_property
     def reach(self) -> float:
@@ -151,9 +167,9 @@ def _check_tool(part: CamPart) -> None:
     sharpest, tolerance = part.number("sharpest_edge"), part.number("edge_tolerance")
     if sharpest < tolerance:
         raise ValueRangeError(
-            f"edge under the cable, with a radius of {MM * sharpest:.3g} mm at its sharpest",
+            f"edge under the {part.counterpart}, with a radius of {MM * sharpest:.3g} mm at its sharpest",
             f"is a corner within its tolerance of {MM * tolerance:.3g} mm",
-            next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
+            next_step="take a larger MinimumRadiusOfCurvature, or a thinner cable",
         )
     tool = part.number("tool_radius")
     inner = np.concatenate([outline.radii for outline in part.outlines])

@@ -1,30 +1,24 @@
-"""Sizes that a workshop needs beside the contour: cable, channel, plate, run-out, bore, bolts, cable end.
-
-The part under a roller: its edge as arcs, hollow or convex, its back, the way of the roller.
-"""
+"""Sizes that a workshop needs beside the contour: cable, channel, plate, run-out, bore, bolts, cable end."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import BPoly
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
-from ...foundation.quantity import MM, Quantity, quantity
+from ...foundation.quantity import Quantity, quantity
 from ..curves.numbers import in_si, plain
-from ..statics.contour import STRAIGHT, Contour, RollerContour
-from .arc_path import ArcPath, biarc, joined
+from ..statics.contour import Contour
+from .arc_path import ArcPath
 from .cam_outline import (
     Contours,
     LipEdge,
     Lips,
-    back_of,
-    few_arcs,
     lip_edge,
     one_sided_outline,
     two_sided_outlines,
@@ -159,12 +153,13 @@ class ClampScrew:
 
 
 class DrawnCam(NamedTuple):
-    """What is drawn of one kind of cam: outlines, holes but those of the bolts, cables or ways, rollers."""
+    """What is drawn of a cam: outlines, holes but those of the bolts, cables or ways, rollers, partners."""
 
     outlines: list[ArcPath]
     holes: list[Hole]
     cables: list[ArcPath]
     rollers: tuple[Hole, ...] = ()
+    partners: tuple[ArcPath, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -273,7 +268,7 @@ class MachinedCam(ABC):
         if back is not None:
             end = quantity(math.degrees(back.angles[-1]), "deg", source="contour for negative angles")
             numbers["back_last_angle"] = end
-        outlines, holes, cables, rollers = self._drawn(contours, (lips[0], lips[1]), numbers)
+        outlines, holes, cables, rollers, partners = self._drawn(contours, (lips[0], lips[1]), numbers)
         if self.bolts is not None:
             holes += [
                 Hole(f"bolt hole {k}", c, plain(self.bolts.hole)) for k, c in enumerate(self.bolts.centres, 1)
@@ -285,7 +280,7 @@ class MachinedCam(ABC):
             base = math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
             numbers["base_radius"] = derived_size(base, "lips, holes and the least wall around them")
         line = contour.centre_line
-        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, rollers)
+        made = CamPart(tuple(outlines), tuple(holes), base, tuple(cables), line, numbers, rollers, partners)
         numbers["reach"] = derived_size(made.reach, "largest distance of an edge from the axis")
         check_machinable(made)
         return made
@@ -517,123 +512,3 @@ def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:
 def derived_size(value: float, how: str) -> Quantity:
     """Return a size that follows from others, in mm."""
     return quantity(round(1e3 * value, 9), "mm", source=f"derived: {how}")
-
-
-_CHECKED = 33
-_RUN_OUT = 9
-"""Nodes over the run-out."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class MachinedRollerCam(MachinedCam):
-    """Sizes of a cam on which a roller runs; other parameters are those of :class:`MachinedCam`.
-
-    Beyond the last angle the roller's centre goes on with the last lever arm.
-
-    Parameters
-    ----------
-    roller_radius
-        Of the roller: the edge lies inside the way of its centre by it.
-
-    Examples
-    --------
-    >>> from nlsdesign.foundation.quantity import quantity
-    >>> MachinedRollerCam(roller_radius=quantity(3.0, "mm")).given()["thickness"].shown
-    4.0
-    """
-
-    roller_radius: Quantity | float
-
-    def given(self) -> dict[str, Quantity]:
-        """Return the numbers by name, with those derived that need no contour."""
-        radius = plain(self.roller_radius)
-        derived = {
-            "tool_radius": derived_size(radius, "radius of the roller, as every hollow is wider"),
-            "thickness": derived_size(max(4e-3, radius), "radius of the roller, at least 4 mm"),
-        }
-        return derived | super().given()
-
-    def _edge(self, contour: Contour, numbers: dict[str, Quantity]) -> LipEdge:
-        if not isinstance(contour, RollerContour):
-            raise ArrangementError(
-                "contour under a cable", "is no edge for a roller",
-                next_step="draw it as a MachinedTwoSidedCam or MachinedOneSidedCam",
-            )  # fmt: skip
-        rho, r = contour.radii_of_curvature, contour.roller_radius
-        under = np.flatnonzero((rho > -r) & (rho <= 0.0))
-        if len(under):
-            worst = under[np.argmin(rho[under])]
-            turns = float(rho[worst]) + r
-            first, last = (f"{math.degrees(contour.bearings[k]):.3g}°" for k in (under[0], under[-1]))
-            raise ValueRangeError(
-                f"edge from {first} to {last}",
-                f"is undercut: the centre of the roller of {MM * r:.4g} mm radius turns with "
-                f"{MM * turns:.4g} mm at {math.degrees(contour.bearings[worst]):.3g}°",
-                next_step=f"take a roller of at most {MM * turns:.3g} mm radius, a larger base radius, "
-                "or design with MinimumRadiusOfCurvature",
-            )
-        how = "smallest radius of curvature of the edge"
-        numbers["sharpest_edge"] = derived_size(float(np.min(rho, where=rho > 0.0, initial=STRAIGHT)), how)
-        if np.any(rho < 0.0):
-            numbers["narrowest_hollow"] = derived_size(float(-np.max(rho[rho < 0.0])), how)
-        numbers["pitch_radius"] = derived_size(float(contour.centre_radii[0]), "base radius of the contour")
-        return roller_edge(contour, over_travel=numbers["over_travel"].number)
-
-    def _drawn(self, contours: Contours, lips: Lips, numbers: dict[str, Quantity]) -> DrawnCam:
-        made, lip = cast(RollerContour, contours[0]), lips[0]
-        self._body_radius(min(lip.last_support, float(made.radii.min())), numbers)
-        outline = joined(lip.path, back_of(lips, numbers), lip.path.mirrored(), closed=True)
-        holes = []
-        if self.hub_bore is not None:
-            holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore)))
-        way = np.vstack([made.centre_line[:0:-1] * [-1.0, 1.0], made.centre_line])
-        last = made.centre_line[-1]
-        centres = (made.centre_line[0], last, last * [-1.0, 1.0])
-        # From the axis through the centre of the roller, and as far again as the roller is wide.
-        ends = [c * (1.0 + 2.0 * made.roller_radius / float(np.hypot(*c))) for c in centres]
-        lines = [way, *(np.array([[0.0, 0.0], end]) for end in ends)]
-        rollers = tuple(Hole("roller", centre, 2.0 * made.roller_radius) for centre in centres)
-        cables = [ArcPath(points, np.zeros(len(points))) for points in lines]
-        return DrawnCam([outline], holes, cables, rollers)
-
-
-def roller_edge(contour: RollerContour, *, over_travel: float) -> LipEdge:
-    """Return the edge on which the centre of a roller follows its way, as arcs.
-
-    Beyond the last angle the way goes on with the last lever arm.
-    """
-    radius = contour.roller_radius
-    end, rho, arm = (float(c[-1]) for c in (contour.bearings, contour.centre_radii, contour.lever_arms))
-    way = np.column_stack([contour.centre_radii, contour.lever_arms, contour.slopes])
-    path, deviation = _arcs_along(contour.bearings, way, radius)
-    if over_travel > 0.0:
-        turned = np.linspace(0.0, over_travel, _RUN_OUT)
-        rest = np.column_stack([rho + arm * turned, np.full(_RUN_OUT, arm), np.zeros(_RUN_OUT)])
-        run_out, beyond = _arcs_along(end + turned, rest, radius)
-        path, deviation = joined(path, run_out), max(deviation, beyond)
-        rho += arm * over_travel
-    last = end + over_travel - math.atan2(arm, rho)
-    return LipEdge(path, deviation, 0.0, last, rho**2 / math.hypot(rho, arm) - radius)
-
-
-def _arcs_along(bearings: Array, way: Array, radius: float) -> tuple[ArcPath, float]:
-    """Return the edge of a roller's way as arcs; columns of ``way``: ρ and its derivatives by the bearing."""
-    centre = BPoly.from_derivatives(bearings, way)
-
-    def over(first: float, last: float) -> tuple[ArcPath, float]:
-        at = np.linspace(first, last, _CHECKED)
-        rho, arm = centre(at)[:, None], centre(at, 1)[:, None]
-        outwards = np.column_stack([np.sin(at), np.cos(at)])
-        along, speed = outwards[:, ::-1] * [1.0, -1.0], np.hypot(rho, arm)
-        tangents = (arm * outwards + rho * along) / speed
-        points = rho * outwards - radius * (rho * outwards - arm * along) / speed
-        path = biarc(points[0], points[-1], first=tangents[0], last=tangents[-1])
-        # A point belongs to the arc on whose side of their common point it lies.
-        which = ((points - path.points[1]) @ (points[-1] - points[0]) > 0.0).astype(int)
-        with np.errstate(invalid="ignore"):
-            away = np.abs(np.hypot(*(points - path.centres[which]).T) - np.abs(path.radii)[which])
-        # An arc that is straight to the last digit has no centre; its span is halved.
-        error = float(np.max(away))
-        return path, error if math.isfinite(error) else math.inf
-
-    return few_arcs(over, bearings)

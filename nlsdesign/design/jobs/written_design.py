@@ -17,8 +17,9 @@ from ...model.structure import CamNames
 from ..curves.numbers import in_unit
 from ..drawing.cam_drawing import write_drawings
 from ..drawing.cam_part import CamPart
-from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedRollerCam, MachinedTwoSidedCam
+from ..drawing.machined_cam import MachinedCam, MachinedOneSidedCam, MachinedTwoSidedCam
 from ..drawing.making import Mounting
+from ..drawing.rolling_cam import MachinedPair, MachinedRollerCam
 from ..optimisation.result import CamDesign
 from ..optimisation.solve import SidesDesign
 from ..statics.declared_cam import declared_cam
@@ -33,8 +34,8 @@ def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam
     """
     kind, radius = declared_edge(design.actuator, design.cam)
     sizes: dict[str, object] = {} if job is None else dict(job.drawing)
-    inside = "cable_radius" if design.cam.roller is None else "roller_radius"
-    if inside not in sizes:
+    inside = "cable_radius" if design.cam.rolling is None else "roller_radius"
+    if inside not in sizes and kind is not MachinedPair:
         if radius is None:
             raise DeckError(
                 design.cam.name, "declares no cable, so the machined edge is not known",
@@ -49,8 +50,9 @@ def machined_cam(design: CamDesign, job: DesignJob | None = None) -> MachinedCam
 
 def declared_edge(actuator: Assembly, cam: CamNames) -> tuple[type[MachinedCam], Quantity | None]:
     """Return the kind of part that a cam is, and the radius of its roller or cable, where declared."""
-    if cam.roller is not None:
-        return MachinedRollerCam, actuator.quantities()[cam.roller.radius]
+    if cam.rolling is not None:
+        of_roller = cam.rolling.radius
+        return (MachinedRollerCam, actuator.quantities()[of_roller]) if of_roller else (MachinedPair, None)
     two_sided = declared_cam(actuator[cam.name]).through_centre
     radius = None
     if cam.cable is not None:

@@ -1,6 +1,6 @@
 """What a design with a coil must keep: its travel, a spring index that can be wound, a wire that endures.
 
-Limits of a cam on which a roller runs.
+Limits of a cam on which a roller runs, or that rolls on its mirror image.
 """
 
 from __future__ import annotations
@@ -19,9 +19,11 @@ from ...foundation.quantity import MM, Quantity
 from ...foundation.symbolic import Expression
 from ..curves.numbers import plain
 from .design_point import DesignPoint
-from .edges import RollerEdge
+from .edges import PairEdge, RollerEdge
 from .limits import Bound, Limit, OneNumber
 
+_SIZE = 0.01
+"""Typical length between pivots in m."""
 _MOST = 1000.0
 """Safety beyond which it is not told apart."""
 
@@ -174,7 +176,7 @@ class GoodmanSafety(Limit):
 def _edge(limit: Limit, design: DesignPoint) -> RollerEdge:
     if not isinstance(design.edge, RollerEdge):
         raise ArrangementError(
-            f"{type(limit).__name__} of '{design.cam.name}'", "is of a cam with a roller, not a cable",
+            f"{type(limit).__name__} of '{design.cam.name}'", "is of a cam with a roller, which this is not",
             next_step="leave the limit out, or give the spring a RollerCam",
         )  # fmt: skip
     return design.edge
@@ -189,14 +191,14 @@ def side_forces(design: DesignPoint, value: Callable[[Expression], Array]) -> It
 
     ``value``: gives the numbers of an expression at the design.
     """
-    roller = design.cam.roller
-    if roller is None or not isinstance(design.edge, RollerEdge):
+    rolling = design.cam.rolling
+    if rolling is None or not isinstance(design.edge, RollerEdge):
         return
     slopes = np.tan(value(design.edge.pressure_angles))
     force = float(np.max(value(design.elements * design.forces) * slopes))
     friction, of = _FRICTION, "that is not declared (SlidingGuide),"
-    if roller.guide_friction is not None:
-        friction, of = (design.model.values[roller.guide_friction],) * 2, "as declared,"
+    if rolling.guide_friction is not None:
+        friction, of = (design.model.values[rolling.guide_friction],) * 2, "as declared,"
     shares = [100.0 * each * float(slopes.max()) / (1.0 - each * float(slopes.max())) for each in friction]
     least, most = (f"at {each:.3g} up to {share:.2g} %" for each, share in zip(friction, shares, strict=True))
     yield (
@@ -279,3 +281,45 @@ class MinimumHollowRadius(Limit):
                 next_step=f"ask for {MM * 1.25 * edge.radius:.4g} mm, or take a smaller roller",
             )
         yield self.along(edge.least_hollow(radius))
+
+
+@dataclass(frozen=True)
+class RoomBetweenPivots(Limit):
+    """The element, stretched by the pretension, fits between the pivots of a rolling pair, and always pulls.
+
+    Parameters
+    ----------
+    beside
+        Length in m between the pivots that hooks, clamps or links take up beside the element.
+
+    Examples
+    --------
+    >>> RoomBetweenPivots(beside=0.004).beside
+    0.004
+    """
+
+    beside: Quantity | float = 0.0
+
+    def __post_init__(self) -> None:
+        self.number("beside", "m", 0.0, 1.0)
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield one bound for each piece of rubber and each coil, and one over the angle.
+
+        Raises
+        ------
+        ArrangementError
+            If the cam rolls on no other.
+        """
+        rolling = design.cam.rolling
+        if rolling is None or not isinstance(design.edge, PairEdge):
+            raise ArrangementError(
+                f"RoomBetweenPivots of '{design.cam.name}'", "is of a cam that rolls on an equal one",
+                next_step="leave the limit out, or give the spring a RollingPair",
+            )  # fmt: skip
+        free = design.parameters[rolling.base] - design.parameters[design.cam.pretension]
+        for name in design.cam.lengths:
+            room = free - design.parameters[name]
+            least = plain(self.beside)
+            yield self.bound(f"room beside {name}", room, least, upper=False, unit="mm", scale=_SIZE)
+        yield self.bound("extension", design.extensions, 0.0, upper=False, unit="mm", scale=_SIZE)

@@ -24,6 +24,7 @@ from .coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    RoomBetweenPivots,
 )
 from .limits import (
     Limit,
@@ -129,6 +130,9 @@ PRESSURE_ANGLE = math.radians(30.0)
 """Largest pressure angle of a follower that slides (Norton 2009, ch. 7)."""
 WIDER = 1.25
 """Radius of a hollow over that of the roller in it. Assumed: below, they nearly fit and touch on an arc."""
+TOOTH_RADIUS = 1e-3
+"""Least radius in m of cams that roll on one another: that of the teeth along their edges (Wu and Mintchev
+2024, Step3_ERCmodeller.m)."""
 COIL_SAFETY = 1.5
 """Assumed: safety of a coil against fatigue. At it the largest shear stress is below 0.45 of the tensile
 strength, up to which coils do not set, whatever the least stress is."""
@@ -166,11 +170,15 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
         radius = values[cam.cable.diameter] * values[cam.cable.bend_ratio] / 2.0
         yield MinimumRadiusOfCurvature(radius)
         yield MaximumCableTension(values[cam.cable.breaking_force] / CABLE_FACTOR)
-    if cam.roller is not None:
+    if cam.rolling is not None and cam.rolling.radius is None:
+        yield MinimumRadiusOfCurvature(TOOTH_RADIUS)
+        yield RoomBetweenPivots()
+    elif cam.rolling is not None and cam.rolling.radius is not None:
+        radius = values[cam.rolling.radius]
         yield MaximumPressureAngle(PRESSURE_ANGLE)
         # The roller's centre turns on twice the radius of the roller at least: Norton 2009, ch. 7.
-        yield MinimumRadiusOfCurvature(values[cam.roller.radius])
-        yield MinimumHollowRadius(WIDER * values[cam.roller.radius])
+        yield MinimumRadiusOfCurvature(radius)
+        yield MinimumHollowRadius(WIDER * radius)
     strengths = [values[p.tensile_strength] for p in cam.specimens if p.tensile_strength is not None]
     if strengths:
         yield MaximumStress(min(strengths), safety_factor=STRESS_FACTOR)

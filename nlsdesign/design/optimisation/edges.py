@@ -1,4 +1,4 @@
-"""The edge of a cam as limits and goals see it: under a cable, or under a roller."""
+"""The edge of a cam as limits and goals see it: under a cable, on its mirror image, or under a roller."""
 
 from __future__ import annotations
 
@@ -78,6 +78,19 @@ class CableEdge(Edge):
     def least_radius(self, radius: float) -> EdgeRow:
         """Return ρ ≥ radius."""
         return EdgeRow("radius of curvature", self.radii_of_curvature, radius, False)
+
+
+@dataclass(frozen=True, eq=False)
+class PairEdge(CableEdge):
+    """A convex contour that rolls on its mirror image: two cams of two halves each."""
+
+    @property
+    def roughness(self) -> Expression:
+        """That of the contour, and half the distance of the pivots squared, relative to 2 mm.
+
+        A pair is convex by itself, so it is sooner to be small than smooth.
+        """
+        return super().roughness + self.supports[0] ** 2 / (0.2 * _LENGTH) ** 2
 
 
 @dataclass(frozen=True, eq=False)

@@ -179,7 +179,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
     tolerance, remarks = _tolerance(solved)
     cam, kinds = search.problem.law.cam, {bound.limit for bound in search.bounds}
     sentences = []
-    if cam.roller is None and "MaximumCableTension" not in kinds:
+    if cam.rolling is None and "MaximumCableTension" not in kinds:
         sentences.append(
             f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
         )
@@ -271,11 +271,11 @@ def _made_otherwise(solved: SolvedSearch) -> str:
     cam, largest = solved.search.problem.law.cam.name, solved.search.problem.design.target.largest
     widths = [name for name in (f"{cam}.onset", f"{cam}.changeover") if name in solved.actuator.quantities()]
     share, pretension = 100.0 * solved.predicted_rms / largest, solved.search.problem.law.cam.pretension
-    if solved.search.problem.law.cam.roller is not None:
+    if solved.search.problem.law.cam.rolling is not None:
         step = math.degrees(solved.search.problem.design.target.last_angle) / INTERVALS
         return (
-            f"at its {INTERVALS} nodes the way of the roller leaves {share:.2g} %; between them the curve "
-            f"bends more than it can: spread its jumps over {step:.2g}° or more"
+            f"at its {INTERVALS} nodes the way of what rolls on it leaves {share:.2g} %; between them the "
+            f"curve bends more than it can: spread its jumps over {step:.2g}° or more"
         )
     freed = "" if pretension in solved.free or solved.lost_travel <= 0.0 else f", free {pretension}"
     return (

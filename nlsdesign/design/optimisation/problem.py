@@ -138,7 +138,8 @@ def design_problem(
         contour, shape = free_shape(made.through_centre, parameters, names=law.cam, ends=ends, arm=arm)
     anchor = law.cam.anchor_distance
     largest = math.inf if anchor is None else _NEAREST_START * model.values[anchor]
-    sizes = StartSizes(arm, stretch, law.cam.pretension, largest, profile)
+    base = 0.0 if law.cam.rolling is None else model.values[law.cam.rolling.base]
+    sizes = StartSizes(arm, stretch, law.cam.pretension, largest, profile, base)
     called = law if width is None else sharp.without_knots(2.0 * stretch, width)
     everything = ca.vertcat(*[parameters[v.name] for v in law.parameters])
 
@@ -168,7 +169,7 @@ def contour_names(cam: CamNames) -> tuple[str, str]:
 def movable_numbers(model: FlatModel, cam: CamNames) -> dict[str, Variable]:
     """Return the single numbers that a design may change, by name."""
     ratios = [body.motor.gear_ratio for body in model.bodies if body.motor is not None]
-    base = [] if cam.roller is None else [cam.roller.base_radius]
+    base = [] if cam.rolling is None else [cam.rolling.base]
     names = [*cam.numbers, cam.anchor_distance, *base, *ratios]
     return {name: model.variable(name) for name in names if name is not None}
 
@@ -194,8 +195,8 @@ def _split(model: FlatModel, free: Sequence[str], cam: CamNames) -> tuple[bool, 
             "the anchor shapes the contour, so it can only be free together with it",
             next_step=f"free '{contours[0]}' too",
         )
-    # The base radius of a cam with a roller is chosen with its contour.
-    base = [cam.roller.base_radius] if cam.roller is not None and contour_is_free else []
+    # The distance of what rolls on a cam is chosen with its contour.
+    base = [cam.rolling.base] if cam.rolling is not None and contour_is_free else []
     return contour_is_free, [v for name, v in movable.items() if name in (*free, *base)]
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
-from ..statics.declared_cam import declared_cam, one_sided, with_roller
+from ..statics.declared_cam import as_pair, declared_cam, one_sided, with_roller
 from .design_search import Search, row_of, spans_of
 from .limits import Bound, MaximumCableTension, MinimumRadiusOfCurvature
 from .loosening import FEASIBLE, Freed, Give, Loosened
@@ -75,10 +75,12 @@ def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
         other = one_sided(part, search.question.target.last_angle)
         words = "a one-sided cam (OneSidedCam), which pulls to one side only"
         yield words, machine.with_part(cam.name, other)
-    if search.problem.contour is not None and cam.roller is None:
+    if search.problem.contour is not None and cam.rolling is None:
         words = "a cam with a roller follower (RollerCam), whose edge may be hollow"
-        rolling = with_roller(part, search.problem.sizes.arm, search.question.target.last_angle)
-        yield words, machine.with_part(cam.name, rolling)
+        sizes = search.problem.sizes.arm, search.question.target.last_angle
+        yield words, machine.with_part(cam.name, with_roller(part, *sizes))
+        words = "two cams that roll on one another (RollingPair), the element between their pivots"
+        yield words, machine.with_part(cam.name, as_pair(part, *sizes))
     # Elements share the torque as areas do, but only they share the force of the cable.
     if any(bound.limit == MaximumCableTension.__name__ for bound in search.bounds):
         count = 2 * round(search.question.model.values[cam.elements])
@@ -93,13 +95,13 @@ class Hollow:
     spans: str  # in words, over the angle
     deepest: float  # least radius of curvature in m, below zero
     freed: Freed | None  # what has to be freed besides; None for nothing
+    what: str  # what a hollow contour would do
 
     def __str__(self) -> str:
         besides = "" if self.freed is None else f" ({self.freed} besides)"
         return (
             f"ConvexContour: the contour would have to be hollow {self.spans}, with radii of curvature "
-            f"down to {1e3 * self.deepest:.3g} mm{besides}; a taut cable lifts off there; the roller of a "
-            "follower (RollerCam) does not, nor does a rolling pair, which is not designed here"
+            f"down to {1e3 * self.deepest:.3g} mm{besides}; {self.what}"
         )
 
 
@@ -129,7 +131,7 @@ def hollow_contour(loose: Loosened) -> Hollow | None:
         if outcome.solved and min(rho) < -_HOLLOW * problem.sizes.arm:
             angles = problem.evaluate(problem.design.angles, outcome.point[: loose.count])
             also = loose.freed(freed, outcome) if freed else None
-            return Hollow(spans_of(angles, where), float(rho.min()), also)
+            return Hollow(spans_of(angles, where), float(rho.min()), also, problem.contour.hollow)
     return None
 
 

@@ -331,7 +331,7 @@ def result_rows(design: CamDesign) -> list[tuple[str, str]]:
     target, check, curves = design.target, design.check, design.curves
     share, largest = 100.0 / target.largest, check.largest
     end = f"{np.degrees(target.last_angle):.4g} deg"
-    pulled = "cable" if design.cam.roller is None else "element"
+    pulled = "cable" if design.cam.rolling is None else "element"
     arms = design.contour.lever_arms
     least = float(arms.min())
     fit = f", contour held to {1e6 * design.fit_error:.2g} µm" if design.fit_error > 0.0 else ""

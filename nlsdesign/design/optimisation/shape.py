@@ -16,11 +16,19 @@ from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
 from ...model import FlatModel
 from ...model.structure import CamNames
-from ..statics.contour import Contour, RollerContour, contour_from_curvature, roller_contour
+from ..statics.contour import (
+    Contour,
+    PairContour,
+    RollerContour,
+    RollingContour,
+    contour_from_curvature,
+    pair_contour,
+    roller_contour,
+)
 from ..statics.declared_cam import DesignedCam, contour_of_cam, declared_cam
 from ..statics.equilibrium import cam_function
 from .design_point import DesignPoint
-from .edges import CableEdge, Edge, RollerEdge
+from .edges import CableEdge, Edge, PairEdge, RollerEdge
 from .limits import Bound
 from .program import DesignVariable, Rows, scaled
 
@@ -69,6 +77,14 @@ class FreeContour(ABC):
 
     # radii_of_curvature: those that must not be negative, or the contour is hollow; none where it may be
     radii_of_curvature: tuple[DesignVariable, ...]
+
+    @property
+    def hollow(self) -> str:
+        """What a hollow contour would do."""
+        return (
+            "a taut cable lifts off there; the roller of a follower (RollerCam) does not, and two cams that "
+            "roll on one another (RollingPair) stay convex"
+        )
 
     @abstractmethod
     def all(self) -> list[DesignVariable]:
@@ -164,13 +180,55 @@ class RollerVariables(FreeContour):
         bearings = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * share).ravel(), nodes[-1])
         law = PPoly(np.array([np.diff(slopes) / np.diff(nodes), slopes[:-1]]), nodes)
         arms, way = law.antiderivative(), law.antiderivative(2)
-        rho = design.parameters[design.cam.roller.base_radius]  # type: ignore[union-attr]
+        rho = design.parameters[design.cam.rolling.base]  # type: ignore[union-attr]
         return roller_contour(
             bearings,
             (way(bearings), arms(bearings), law(bearings)),
             base_radius=float(value(rho)[0]),
             roller_radius=self.radius,
         )
+
+
+@dataclass(frozen=True, eq=False)
+class PairVariables(FreeContour):
+    """The variables of a cam that rolls on its mirror image.
+
+    With a first slope above zero both begin with a straight facet, and the lever arm with a jump.
+    """
+
+    first_slope: DesignVariable
+    per_interval: float  # intervals in a radian of the angle
+
+    @property
+    def hollow(self) -> str:
+        """What a hollow contour would do."""
+        return "both cams would meet there; with a larger distance of their pivots they would not"
+
+    def all(self) -> list[DesignVariable]:
+        """Return them in the order of the vector."""
+        return [*self.radii_of_curvature, self.first_slope]
+
+    def at(self, start: Start, sizes: StartSizes) -> dict[str, float]:
+        """Return a lever arm that rises and falls as the torque does, where the profile stays convex."""
+        arms = 2.0 * start.contour_size * start.slope_share * sizes.profile
+        # A curve that begins with a jump needs a facet.
+        arms[0] = max(0.0, 2.0 * arms[1] - arms[2])
+        radii = np.maximum(sizes.base / sizes.arm / 2.0 + 2.0 * np.gradient(arms) * self.per_interval, 0.1)
+        values = {v.name: each for v, each in zip(self.radii_of_curvature, radii.tolist(), strict=True)}
+        return values | {self.first_slope.name: arms[0]}
+
+    def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
+        """Return that the profile is convex."""
+        return [] if curved else [held(CONVEX, "radius of curvature", design.radii_of_curvature, arm)]
+
+    def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
+        """Return the contour at a solution."""
+        base = design.parameters[design.cam.rolling.base]  # type: ignore[union-attr]
+        edge = contour_from_curvature(
+            value(design.directions), value(design.radii_of_curvature), anchor_distance=np.inf,
+            first_slope=float(value(self.first_slope.value)[0]), first_lever_arm=float(value(base)[0]) / 2.0,
+        )  # fmt: skip
+        return pair_contour(edge)
 
 
 State = tuple[Expression, ...]
@@ -266,6 +324,29 @@ def rolled(
     return RollerVariables((), variables, radius, INTERVALS / last_angle), shape
 
 
+def paired(last_angle: float, arm: float, *, end: Expression, base: Expression) -> tuple[FreeContour, Shape]:
+    """Return a cam that rolls on its mirror image; ``base``: distance of the pivots at angle zero."""
+    variables = PairVariables(_radii(arm), _length("first_slope", arm, start=0.0), INTERVALS / last_angle)
+    support = _support(variables, base / 2.0, end / 2.0, arm)
+    p, arms, _, directions, held = support[:5]
+    rho = ca.vertcat(*[u.value for u in variables.radii_of_curvature])
+    clear = Rows(p / arm, 0.01, ca.inf)
+    edge = PairEdge(directions, p, rho, 4)
+    return variables, _pair(edge, arms, 2.0 * (p - p[0]), (held, clear))._replace(
+        states=support.states, state_values=support.state_values
+    )
+
+
+def _pair(edge: PairEdge, arms: Expression, taken: Expression, rows: tuple[Rows, ...] = ()) -> Shape:
+    p, rho = edge.supports, edge.radii_of_curvature
+    # At angle zero the two sides meet: whatever facet the profile begins with, the lever arm is zero.
+    arms = ca.vertcat(0, arms[1:])
+    return Shape(
+        edge.directions, 2.0 * edge.directions, arms, _distance(p, arms), rho, taken, (rho - p) / 2.0,
+        rows, True, (), ca.SX(0, 1), edge,
+    )  # fmt: skip
+
+
 def _rolling(
     edge: RollerEdge,
     taken: Expression,
@@ -292,10 +373,12 @@ def free_shape(
     that stands for it; ``arm``: a typical lever arm in m.
     """
     last_angle, end = ends
-    anchor, roller = names.anchor_distance, names.roller
-    if roller is not None:
-        base, radius = parameters[roller.base_radius], float(parameters[roller.radius])
-        return rolled(last_angle, arm, end=end, base=base, radius=radius)
+    anchor, rolling = names.anchor_distance, names.rolling
+    if rolling is not None:
+        base = parameters[rolling.base]
+        if rolling.radius is None:
+            return paired(last_angle, arm, end=end, base=base)
+        return rolled(last_angle, arm, end=end, base=base, radius=float(parameters[rolling.radius]))
     if both_sides and anchor is not None:
         return through_centre(parameters[anchor], last_angle, arm, end=end)
     return parallel(end, arm)
@@ -305,7 +388,7 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
     """Return the shape of a declared cam that stays as it is."""
     contour = contour_of_cam(cam, last_angle=last_angle, points=INTERVALS + 1)
     both = declared_cam(cam).through_centre
-    if isinstance(cam, DesignedCam) or isinstance(contour, RollerContour):
+    if isinstance(cam, DesignedCam) or isinstance(contour, RollingContour):
         # As the search saw it that designed the contour, without the change of sides of the fitted cam.
         extensions = contour.taken_lengths
     else:
@@ -316,6 +399,10 @@ def given(model: FlatModel, cam: object, last_angle: float, spring: str) -> Shap
         centre = ca.SX(contour.centre_radii)
         edge = RollerEdge(ca.SX(contour.bearings), centre, arms, slopes, contour.roller_radius)
         return _rolling(edge, ca.SX(extensions), (), ((), ca.SX(0, 1)))
+    if isinstance(contour, PairContour):
+        on = contour.edge
+        pair = PairEdge(ca.SX(on.directions), ca.SX(on.lever_arms), ca.SX(on.radii_of_curvature), 4)
+        return _pair(pair, ca.SX(contour.lever_arms), ca.SX(extensions))
     # dφ/dθ = 1/(1 − p'/√(D² − p²)); the fraction vanishes for an anchor that is infinitely far.
     root = np.sqrt(contour.anchor_distance**2 - contour.lever_arms**2)
     rho, phi, p = (ca.SX(c) for c in (contour.radii_of_curvature, contour.directions, contour.lever_arms))
@@ -335,7 +422,9 @@ def _length(name: str, size: float, *, start: float) -> DesignVariable:
     return DesignVariable(name, symbol, size * symbol, 0.0, _LARGEST_RADIUS / size, start)
 
 
-def _support(variables: ContourVariables, first: Expression, last: Expression, size: float) -> _Support:
+def _support(
+    variables: ContourVariables | PairVariables, first: Expression, last: Expression, size: float
+) -> _Support:
     rho, step = [u.value for u in variables.radii_of_curvature], last / INTERVALS
     begin = {"support": first, "support_slope": variables.first_slope.value, "arc": ca.SX(0)}
     (p, slopes, arcs), held, states = _course(
@@ -417,6 +506,7 @@ class StartSizes(NamedTuple):
     pretension: str
     largest_arm: float
     profile: Array  # wanted torque at the nodes, relative to the largest
+    base: float  # declared distance in m of what rolls on the cam; zero for a cable
 
 
 def start_values(

@@ -51,10 +51,10 @@ class LimitNumber(NamedTuple):
 
 
 def under_cable(cam: CamNames) -> CamNames:
-    """Return the names around a cam, or refuse one on which a roller runs."""
-    if cam.roller is not None:
+    """Return the names around a cam, or refuse one on which something rolls."""
+    if cam.rolling is not None:
         raise ArrangementError(
-            f"cam '{cam.name}'", "has a roller, which the live page does not design yet",
+            f"cam '{cam.name}'", f"has {cam.rolling.what}, which the live page does not design yet",
             next_step="design it with design_cam, or with the command design",
         )  # fmt: skip
     return cam

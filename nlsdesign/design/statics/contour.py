@@ -21,6 +21,14 @@ The roller's centre has the distance ρ(θ) = ρ₀ + x(θ) from the axis, and i
 
 Where κ < 0 the edge is hollow, with the radius 1/|κ| + r, always wider than the roller; where 1/κ < r the
 roller undercuts it. Source: Norton 2009, ch. 7 (pressure angle, radius of curvature, undercutting).
+
+Geometry of a cam that rolls on its mirror image.
+
+Their common tangent stays half way between the two pivots, so with the distance d(θ) of these, in either cam,
+
+    φ = θ/2,    p(φ) = d/2,    p' = dd/dθ = h,    ρ = p + p'' = d/2 + 2·dh/dθ,    point p·n + h·t.
+
+Both are convex where ρ ≥ 0; mirror images that are hollow meet. Source: Wu and Mintchev 2024.
 """
 
 from __future__ import annotations
@@ -301,21 +309,14 @@ STRAIGHT = 10.0
 
 
 @dataclass(frozen=True, eq=False)
-class RollerContour(Contour):
-    """One side of a cam with a roller, from angle zero on; arrays of shape (n,), in SI.
+class RollingContour(Contour):
+    """One side of a cam on which something rolls, from angle zero on; the other side is its mirror image.
 
-    Of the base class ``lever_arms`` and ``slopes`` are h and dh/dθ, ``directions`` those of the normal, which
-    may turn back, and ``radii_of_curvature`` those of the edge, below zero where it is hollow.
+    Of the base class ``lever_arms`` and ``slopes`` are h and dh/dθ, ``directions`` those of the normal.
     """
 
-    bearings: Array  # θ, ascending from zero
-    centre_radii: Array  # ρ
-    roller_radius: float
-
-    @cached_property
-    def angles(self) -> Array:
-        """Cam angle θ at which the roller touches each point."""
-        return self.bearings
+    bearings: Array  # of the centre of what rolls, in the frame of the cam, ascending from zero
+    centre_radii: Array  # distance of that centre from the axis of the cam
 
     @cached_property
     def normals(self) -> Array:
@@ -325,15 +326,9 @@ class RollerContour(Contour):
 
     @cached_property
     def centre_line(self) -> Array:
-        """Points of the pitch curve, shape (n, 2)."""
+        """Points of the way of that centre, shape (n, 2)."""
         outwards = np.column_stack([np.sin(self.bearings), np.cos(self.bearings)])
         result: Array = self.centre_radii[:, None] * outwards
-        return result
-
-    @cached_property
-    def points(self) -> Array:
-        """Points of the edge in the frame of the cam, shape (n, 2)."""
-        result: Array = self.centre_line - self.roller_radius * self.normals
         return result
 
     @cached_property
@@ -343,15 +338,53 @@ class RollerContour(Contour):
         return result
 
     @cached_property
+    def taken_lengths(self) -> Array:
+        """Way of that centre since angle zero: the integral of the lever arm."""
+        result: Array = self.centre_radii - self.centre_radii[0]
+        return result
+
+    def turned(self, angle: float) -> float:
+        """Return by how much the cam has turned in the frame of the line of both centres."""
+        return angle
+
+    def cable(self, angle: float) -> Array:
+        """Return the contact, and the centre of what rolls on the y axis."""
+        here = [np.interp(abs(angle), self.angles, column) for column in self.points.T]
+        mirrored = np.array([here]) * [1.0 if angle >= 0.0 else -1.0, 1.0]
+        centre = float(np.interp(abs(angle), self.angles, self.centre_radii))
+        return np.vstack([turn(mirrored, self.turned(angle)), [0.0, centre]])
+
+    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, ...]:
+        """Return both sides as one closed polygon under the line of both centres, closed through the axis."""
+        right = self.points
+        both = np.vstack([right[::-1] * [-1.0, 1.0], right[1:], [[0.0, 0.0]]])
+        return (turn(np.vstack([both, both[:1]]), self.turned(angle)),)
+
+
+@dataclass(frozen=True, eq=False)
+class RollerContour(RollingContour):
+    """One side of a cam with a roller, from angle zero on; arrays of shape (n,), in SI.
+
+    The ``directions`` may turn back; ``radii_of_curvature`` are below zero where the edge is hollow.
+    """
+
+    roller_radius: float
+
+    @cached_property
+    def angles(self) -> Array:
+        """Cam angle θ at which the roller touches each point."""
+        return self.bearings
+
+    @cached_property
+    def points(self) -> Array:
+        """Points of the edge in the frame of the cam, shape (n, 2)."""
+        result: Array = self.centre_line - self.roller_radius * self.normals
+        return result
+
+    @cached_property
     def pressure_angles(self) -> Array:
         """Angle between the normal of the edge and the line of the follower, of the sign of h."""
         return np.arctan2(self.lever_arms, self.centre_radii)
-
-    @cached_property
-    def taken_lengths(self) -> Array:
-        """Way of the follower since angle zero: the integral of the lever arm."""
-        result: Array = self.centre_radii - self.centre_radii[0]
-        return result
 
     def surface(self, cable_radius: float = 0.0) -> Array:
         """Return the points at a distance inside the pitch curve: at the radius of the roller the edge."""
@@ -363,18 +396,48 @@ class RollerContour(Contour):
         """The edge."""
         return "edge under the roller"
 
-    def cable(self, angle: float) -> Array:
-        """Return where roller and edge touch, and the roller's centre, in the resting frame."""
-        here = [np.interp(abs(angle), self.bearings, column) for column in self.points.T]
-        mirrored = np.array([here]) * [1.0 if angle >= 0.0 else -1.0, 1.0]
-        centre = float(np.interp(abs(angle), self.bearings, self.centre_radii))
-        return np.vstack([turn(mirrored, angle), [0.0, centre]])
 
-    def outlines(self, angle: float = 0.0, *, cable_radius: float = 0.0) -> tuple[Array, ...]:
-        """Return both sides as one closed polygon in the resting frame, closed through the axis."""
-        right = self.points
-        both = np.vstack([right[::-1] * [-1.0, 1.0], right[1:], [[0.0, 0.0]]])
-        return (turn(np.vstack([both, both[:1]]), angle),)
+@dataclass(frozen=True, eq=False)
+class PairContour(RollingContour):
+    """One side of a cam that rolls on its mirror image, whose pivot has half of the angle as its bearing."""
+
+    @cached_property
+    def angles(self) -> Array:
+        """Angle θ by which the pair has rolled to each point."""
+        return 2.0 * self.directions
+
+    @cached_property
+    def points(self) -> Array:
+        """Points of the edge in the frame of the cam, shape (n, 2)."""
+        return self.edge.points
+
+    @cached_property
+    def edge(self) -> Contour:
+        """The edge by its support function."""
+        p = self.centre_radii / 2.0
+        return Contour(self.directions, p, self.lever_arms, self.radii_of_curvature, np.inf)
+
+    def turned(self, angle: float) -> float:
+        """Return half of the angle."""
+        return angle / 2.0
+
+    def surface(self, cable_radius: float = 0.0) -> Array:
+        """Return the points of the edge."""
+        return self.points
+
+    @property
+    def drawn_line(self) -> str:
+        """The edge."""
+        return "edge that rolls on its mirror image"
+
+
+def pair_contour(edge: Contour) -> PairContour:
+    """Return the side of a cam that rolls on its mirror image, of the support function of its edge."""
+    p, rho = edge.lever_arms, edge.radii_of_curvature
+    return PairContour(
+        directions=edge.directions, lever_arms=edge.slopes, slopes=(rho - p) / 2.0, radii_of_curvature=rho,
+        anchor_distance=np.inf, bearings=edge.directions, centre_radii=2.0 * p,
+    )  # fmt: skip
 
 
 def roller_contour(

@@ -12,13 +12,21 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
-from ...components.transmission.cam_shapes import AnchoredCam, OneSidedCam
+from ...components.transmission.cam_shapes import AnchoredCam, MirroredCam, OneSidedCam
 from ...components.transmission.lopsided_cam import LopsidedCam
 from ...components.transmission.roller_cam import RollerCam
+from ...components.transmission.rolling_pair import RollingPair
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity, significant
-from .contour import Contour, RollerContour, contour_from_lever_arm, roller_contour
+from .contour import (
+    Contour,
+    PairContour,
+    RollerContour,
+    contour_from_lever_arm,
+    pair_contour,
+    roller_contour,
+)
 
 Made = TypeVar("Made", bound=Cam)
 
@@ -119,11 +127,12 @@ def _two_sides(width: float, angles: Array, lever_arms: Array, count: int) -> tu
     return values, error
 
 
-@dataclass(frozen=True)
-class _Roller(DeclaredCam[RollerCam]):
+class _Rolling(DeclaredCam[Made]):
+    """A cam without a cable."""
+
     @property
     def through_centre(self) -> bool:
-        """True: both sides are alike, and the lever arm is zero between them."""
+        """True: both sides are alike."""
         return True
 
     @property
@@ -131,25 +140,43 @@ class _Roller(DeclaredCam[RollerCam]):
         """Infinite: there is no cable."""
         return math.inf
 
-    def contour(self, last_angle: float | None, points: int) -> RollerContour:
-        """Return the edge; with its change of sides, which a roller follows too."""
-        part, width = self.part, self.part.changeover.number
+    def law(self, last_angle: float | None, points: int) -> tuple[Array, BSpline]:
+        """Return angles, and the lever arm on its side as a spline."""
+        part: Any = self.part
         end, row = part.last_angle.number, np.array(part.lever_arm.values)
         angles = np.linspace(0.0, _end(end, last_angle), points)
-        root = np.hypot(angles, width)
-        q, slope = angles**2 / (root + width), angles / root
-        spline = BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
-        taken, arm = spline.antiderivative(), spline(q)
-        way = (taken(q) - taken(0.0), arm * slope, spline(q, 1) * slope**2 + arm * width**2 / root**3)
-        return roller_contour(
-            angles, way, base_radius=part.base_radius.number, roller_radius=part.roller_radius.number
-        )
+        return angles, BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
 
     def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
-        values, error = _two_sides(self.part.changeover.number, angles, lever_arms, count)
-        end = self.part.last_angle.with_value(float(angles[-1]), _SOURCE)
-        return CamFit(replace(self.part, lever_arm=_row(self.part.lever_arm, values), last_angle=end), error)
+        part: Any = self.part
+        values, error = _two_sides(part.changeover.number, angles, lever_arms, count)
+        end = part.last_angle.with_value(float(angles[-1]), _SOURCE)
+        return CamFit(replace(part, lever_arm=_row(part.lever_arm, values), last_angle=end), error)
+
+
+class _Roller(_Rolling[RollerCam]):
+    def contour(self, last_angle: float | None, points: int) -> RollerContour:
+        """Return the edge under the roller."""
+        angles, spline = self.law(last_angle, points)
+        width, root = self.part.changeover.number, np.hypot(angles, self.part.changeover.number)
+        # A roller follows the change of sides too.
+        q, slope = angles**2 / (root + width), angles / root
+        taken, arm = spline.antiderivative(), spline(q)
+        way = (taken(q) - taken(0.0), arm * slope, spline(q, 1) * slope**2 + arm * width**2 / root**3)
+        base, radius = self.part.base_radius.number, self.part.roller_radius.number
+        return roller_contour(angles, way, base_radius=base, roller_radius=radius)
+
+
+class _Pair(_Rolling[RollingPair]):
+    def contour(self, last_angle: float | None, points: int) -> PairContour:
+        """Return the edge that rolls on its mirror image."""
+        angles, spline = self.law(last_angle, points)
+        # Where the lever arm begins with a jump the profile begins with a facet, in place of the change of
+        # sides: beyond that the lever arm is H(θ − w).
+        at, taken = angles - self.part.changeover.number, spline.antiderivative()
+        p = (self.part.base_distance.number + taken(at) - taken(0.0)) / 2.0
+        return pair_contour(Contour(angles / 2.0, p, spline(at), p + 2.0 * spline(at, 1), math.inf))
 
 
 @dataclass(frozen=True)
@@ -291,6 +318,8 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
         return _Anchored(part)
     if isinstance(part, RollerCam):
         return _Roller(part)
+    if isinstance(part, RollingPair):
+        return _Pair(part)
     if isinstance(part, LopsidedCam):
         raise ArrangementError(
             "a LopsidedCam", "has two contours, and a target is for one",
@@ -298,7 +327,7 @@ def declared_cam(part: object) -> DeclaredCam[Any]:
         )  # fmt: skip
     raise ArrangementError(
         f"a {type(part).__name__}", "has no contour",
-        next_step="give its spring a TwoSidedCam, OneSidedCam, AnchoredCam or RollerCam",
+        next_step="give its spring a TwoSidedCam, OneSidedCam, AnchoredCam, RollerCam or RollingPair",
     )  # fmt: skip
 
 
@@ -344,13 +373,20 @@ def with_roller(part: Any, arm: float, last_angle: float) -> RollerCam:
     )
 
 
+def as_pair(part: Any, arm: float, last_angle: float) -> RollingPair:
+    """Return a pair of cams to begin with, with the elements of another; as for :func:`with_roller`."""
+    arms, base = Quantity((0.0, *[0.5 * arm] * 7), "m"), Quantity(8.0 * arm, "m")
+    end = Quantity(last_angle, "rad")
+    return RollingPair(lever_arm=arms, last_angle=end, base_distance=base, elements=part.elements)
+
+
 def with_contour(part: object, contour: Contour | None) -> object:
     """Return a part as what the design sees of it: with its contour where that was designed.
 
     ``contour``: that it was fitted to; ``None`` where that is not known.
     """
-    # A roller follows the ripples of the fitted cam as well, so that is what it is judged by.
-    if contour is None or not isinstance(part, Cam) or isinstance(part, RollerCam):
+    # What rolls follows the ripples of the fitted cam as well, so that is what it is judged by.
+    if contour is None or not isinstance(part, Cam) or isinstance(part, MirroredCam):
         return part
     return DesignedCam(part, contour)
 
@@ -361,8 +397,8 @@ def contour_of_cam(cam: object, *, last_angle: float | None = None, points: int 
     Parameters
     ----------
     cam
-        A :class:`~nlsdesign.components.TwoSidedCam`, :class:`~nlsdesign.components.OneSidedCam` or
-        :class:`~nlsdesign.components.AnchoredCam`.
+        A :class:`~nlsdesign.components.TwoSidedCam`, ``OneSidedCam``, ``AnchoredCam``, ``RollerCam`` or
+        ``RollingPair``.
     last_angle
         In rad; the end of the cam's table if it is left out.
     points

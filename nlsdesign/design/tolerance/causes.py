@@ -196,9 +196,10 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     cam = series_cam(model, spring)
-    if cam.roller is not None:
+    if cam.rolling is not None:
         raise ArrangementError(
-            f"cam '{cam.name}'", "has a roller; how an error of its edge acts on the torque is not known yet",
+            f"cam '{cam.name}'",
+            f"has {cam.rolling.what}; how an error of its edge acts on the torque is not known yet",
             next_step="leave tolerance goals out and ask for no draws, or sweep the numbers of the deck",
         )  # fmt: skip
     tie = next(each for each in model.springs if cam in each.cams)

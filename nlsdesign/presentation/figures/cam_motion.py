@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Arc
 
 from ...design import CamDesign, Contour, elastic_law
-from ...design.statics.contour import RollerContour, cable_up_to, turn
+from ...design.statics.contour import RollerContour, RollingContour, cable_up_to, turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, typeset_number
@@ -378,21 +378,21 @@ def _rounded(values: Array) -> list[float]:
     return [round(float(value), 2) + 0.0 for value in values]
 
 
-def draw_roller(axes: Axes, design: CamDesign, contour: RollerContour, angle: float) -> None:
-    """Draw cam, roller and the line of the follower at an angle in rad into axes, in mm."""
+def draw_rolling(axes: Axes, design: CamDesign, contour: RollingContour, angle: float) -> None:
+    """Draw cam, what rolls on it and the line of both centres at an angle in rad into axes, in mm."""
     for polygon in contour.outlines(angle):
         axes.fill(*(polygon * MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
     way = np.vstack([contour.centre_line[:0:-1] * [-1.0, 1.0], contour.centre_line])
-    axes.plot(*(turn(way, angle) * MM).T, color=BLUE.light, linewidth=0.8, linestyle=(0, (5, 2)))
-    touched, centre = contour.cable(angle) * MM
-    size, turned = MM * contour.roller_radius, np.linspace(0.0, 2.0 * np.pi, 73)
-    circle = centre[:, None] + size * np.array([np.cos(turned), np.sin(turned)])
-    axes.fill(*circle, facecolor="none", edgecolor=BLUE.light, linewidth=1.4)
-    axes.plot(*touched, marker="o", color=VERMILLION.light, markersize=4)
     axes.plot(
-        [0.0, 0.0], [0.0, centre[1] + 2.5 * size], color=INK.light, linewidth=0.8, linestyle=(0, (8, 2, 1, 2))
+        *(turn(way, contour.turned(angle)) * MM).T, color=BLUE.light, linewidth=0.8, linestyle=(0, (5, 2))
     )
-    axes.plot([0], [0], marker="o", color=INK.light, markersize=4)
+    touched, centre = contour.cable(angle) * MM
+    for polygon in _rolls(contour, angle):
+        axes.fill(*(polygon * MM).T, facecolor="none", edgecolor=BLUE.light, linewidth=1.4)
+    axes.plot(*touched, marker="o", color=VERMILLION.light, markersize=4)
+    end = MM * _reach(contour)
+    axes.plot([0.0, 0.0], [0.0, end], color=INK.light, linewidth=0.8, linestyle=(0, (8, 2, 1, 2)))
+    axes.plot([0, centre[0]], [0, centre[1]], "o", color=INK.light, markersize=4)
     curves, check = design.curves, design.check
     numbers = (
         f"arm {MM * float(np.interp(angle, contour.angles, contour.lever_arms)):.1f} mm",
@@ -404,19 +404,37 @@ def draw_roller(axes: Axes, design: CamDesign, contour: RollerContour, angle: fl
     axes.grid(visible=False)
 
 
-def roller_picture(design: CamDesign, contour: RollerContour) -> Figure:
-    """Draw cam and roller above each other at angle zero and at the last angle."""
+def _rolls(contour: RollingContour, angle: float) -> tuple[Array, ...]:
+    """Return the outline in m of what rolls on a cam: a roller, or its mirror image at the common tangent."""
+    _, centre = contour.cable(angle)
+    if isinstance(contour, RollerContour):
+        turned = np.linspace(0.0, 2.0 * np.pi, 73)
+        return (centre + contour.roller_radius * np.column_stack([np.cos(turned), np.sin(turned)]),)
+    return tuple(centre + polygon * [1.0, -1.0] for polygon in contour.outlines(angle))
+
+
+def _reach(contour: RollingContour) -> float:
+    """Return how far in m what rolls on a cam gets from its axis."""
+    size = contour.roller_radius if isinstance(contour, RollerContour) else float(contour.radii.max())
+    return float(contour.centre_radii.max()) + 1.3 * size
+
+
+def rolling_picture(design: CamDesign, contour: RollingContour) -> Figure:
+    """Draw cam and what rolls on it above each other at angle zero and at the last angle."""
     last = float(contour.angles[-1])
-    reach = MM * (float(contour.centre_radii.max()) + 2.6 * contour.roller_radius)
+    reach = MM * _reach(contour)
     figure, axes = panels(2, 1, height=0.5 * WIDTH, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
-        draw_roller(panel, design, contour, angle)
+        draw_rolling(panel, design, contour, angle)
         panel.set(xlim=(-reach, reach), ylim=(-reach, reach))
     axes[1].set_xlabel("distance from the axis in mm")
-    steepest = float(np.degrees(np.abs(contour.pressure_angles).max()))
+    what, more = "another that rolls on it", f"pivots {MM * contour.centre_radii[0]:.1f} mm apart at 0°"
+    if isinstance(contour, RollerContour):
+        steepest = float(np.degrees(np.abs(contour.pressure_angles).max()))
+        what = "its roller"
+        more = f"roller {MM * contour.roller_radius:.1f} mm, pressure angle up to {steepest:.0f}°"
     return described(
         figure,
-        f"The designed cam with its roller at 0° and {np.degrees(last):.0f}°, to scale: radius "
-        f"{MM * float(contour.radii.max()):.1f} mm, roller {MM * contour.roller_radius:.1f} mm, "
-        f"pressure angle up to {steepest:.0f}°.",
+        f"The designed cam with {what} at 0° and {np.degrees(last):.0f}°, to scale: radius "
+        f"{MM * float(contour.radii.max()):.1f} mm, {more}.",
     )

@@ -98,7 +98,7 @@ def _numbers(design: CamDesign) -> list[tuple[str, ...]]:
         ("work stored from 0° to there", prefixed(float(curves.energy), "J")),
         ("with exact numbers, rms", f"{prefixed(design.rms, 'N*m')} ({share:.2g} %)"),
         (
-            f"largest force of {'a cable' if design.cam.roller is None else 'an element'}",
+            f"largest force of {'a cable' if design.cam.rolling is None else 'an element'}",
             f"{three_digits(float(np.max(curves.forces)))} N",
         ),
         ("volume of all rubber", f"{three_digits(1e6 * design.rubber_volume)} cm³"),

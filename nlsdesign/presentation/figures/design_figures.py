@@ -19,12 +19,12 @@ from ...design import (
     TaskCurve,
     ToleranceResult,
 )
-from ...design.statics.contour import RollerContour, turn
+from ...design.statics.contour import RollingContour, turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, parse_unit, typeset_number, typeset_unit, with_unit
 from ...foundation.written_numbers import shared_prefix
-from .cam_motion import draw_roller, roller_picture
+from .cam_motion import draw_rolling, rolling_picture
 from .style import (
     AFTER,
     BEFORE,
@@ -51,8 +51,8 @@ from .style import (
 @styled
 def design_picture(design: CamDesign) -> Figure:
     """Draw cam, cable and rubber to scale, at angle zero and at the last angle, with dimensions."""
-    if isinstance(design.contour, RollerContour):
-        return roller_picture(design, design.contour)
+    if isinstance(design.contour, RollingContour):
+        return rolling_picture(design, design.contour)
     last = float(design.contour.angles[-1])
     reach = float(design.contour.radii.max())
     piece = _piece(design)
@@ -125,8 +125,8 @@ def _used(state: LimitState) -> float:
 def draw_mechanism(axes: Axes, design: CamDesign, angle: float) -> None:
     """Draw cam, cable and rubber at an angle in rad into axes, to scale, in mm."""
     contour = design.contour
-    if isinstance(contour, RollerContour):
-        draw_roller(axes, design, contour, angle)
+    if isinstance(contour, RollingContour):
+        draw_rolling(axes, design, contour, angle)
         return
     parallel = not np.isfinite(contour.anchor_distance)
     halves = list(contour.outlines())

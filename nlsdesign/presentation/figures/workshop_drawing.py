@@ -37,6 +37,7 @@ _SIZES = (
     ("cable_radius", "Cable radius"),
     ("roller_radius", "Roller radius"),
     ("pitch_radius", "Axis to roller at 0°"),
+    ("pivot_distance", "Pivot to pivot at 0°"),
     ("narrowest_hollow", "Narrowest hollow"),
     ("thickness", "Plate thickness"),
     ("groove_depth", "Depth of the edges"),
@@ -348,6 +349,8 @@ def _notes(page: Sheet, part: CamPart, title: TitleBlock, torque: float) -> None
         lines.append(
             f"3  Mouths of the channel: + {tolerance:.3g} / 0 mm, edges opposite each other within that."
         )
+    elif part.partners:
+        lines.append("3  Cut two. Teeth or bands that keep them from slipping are not drawn.")
     elif part.rollers:
         lines.append("3  No roller runs on the back, between the ends of the edge.")
     else:
@@ -355,7 +358,7 @@ def _notes(page: Sheet, part: CamPart, title: TitleBlock, torque: float) -> None
     lines += [
         f"4  Holes: places as in {title.file}, ± 0.05 mm; else ISO 2768-1 m (both assumed).",
         "5  Coloured: "
-        + ("way of the roller, roller" if part.rollers else "centre line of the cable")
+        + ("way of the centre of what rolls on it" if part.rolls else "centre line of the cable")
         + " at zero and at the last angle.",
         *textwrap.wrap(f"6  Process: {process_of(part)}.", _NOTE, subsequent_indent="    "),
     ]
@@ -371,7 +374,7 @@ def _column(
     top, right = _HEIGHT - _BORDER, _WIDTH - _BORDER
     width = right - _COLUMN
     if rows:
-        head = ("angle in °", "torque in N·m", "arm in mm", f"{'spring' if part.rollers else 'cable'} in N")
+        head = ("angle in °", "torque in N·m", "arm in mm", f"{'spring' if part.rolls else 'cable'} in N")
         cells = [
             (
                 f"{math.degrees(r.angle):.1f}",
@@ -393,7 +396,7 @@ def _column(
         ("Deck", title.deck),
         ("Design", title.fingerprint),
         ("Material", title.material),
-        (part.counterpart.title(), f"Ø{_length(2 * part.number(f'{part.counterpart}_radius'))} mm"),
+        ("Edge for", part.size_of_counterpart),
         ("Scale, sheet", f"{scale_text(scale)}, A4, mm"),
     ]
     row, low = 5.2, _BORDER

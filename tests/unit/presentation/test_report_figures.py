@@ -100,7 +100,7 @@ def test_colours_are_taken_by_their_meaning() -> None:
         "cam_frames",
         "cam_motion",
         "design_figures",
-        "roller_picture",
+        "rolling_picture",
         "workshop_drawing",
     }
     for path in (ROOT / "nlsdesign" / "presentation" / "figures").glob("*.py"):

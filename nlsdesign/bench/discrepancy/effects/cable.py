@@ -13,6 +13,7 @@ from ....components import (
     Element,
     InextensibleCable,
     PullOnly,
+    RollingPair,
     Slack,
     Specimen,
     StretchyCable,
@@ -34,8 +35,18 @@ _CREEP_SPEED = 2e-4
 """Speed in m/s at which a fitted cable still creeps over its guide."""
 
 
+def _by_cable(assembly: Assembly) -> list[str]:
+    """Return what cams stretch by a cable; between the pivots of a rolling pair there is none."""
+    pairs = [path for path, element in laws(assembly) if _of_pair(element)]
+    return [path for path in stretched(assembly) if not any(path.startswith(f"{pair}.") for pair in pairs)]
+
+
+def _of_pair(part: Part) -> bool:
+    return isinstance(part, Through) and isinstance(part.cam, RollingPair)
+
+
 def _without_rate(assembly: Assembly) -> list[str]:
-    return [path for path in stretched(assembly) if not assembly.element(path).needs_rate]
+    return [path for path in _by_cable(assembly) if not assembly.element(path).needs_rate]
 
 
 def _stretchy(assembly: Assembly, path: str) -> Iterator[Edit]:
@@ -54,7 +65,7 @@ def _pulled(assembly: Assembly) -> list[str]:
     True contact asks where the piece inside rests; inside a slack wrapper it would rest anywhere.
     """
     paths = []
-    for path in stretched(assembly):
+    for path in _by_cable(assembly):
         if assembly.element(path).domain == TRANSLATION:
             outer, owner = path, path.rpartition(".")[0]
             while owner and isinstance(assembly[owner], InextensibleCable):
@@ -103,7 +114,9 @@ def _buckling(assembly: Assembly, name: str) -> Iterator[Edit]:
 
 
 def _behind_cams(assembly: Assembly) -> list[str]:
-    return [f"{path}.{p.behind[0]}" for path, p in laws(assembly) if isinstance(p, Through)]
+    return [
+        f"{path}.{p.behind[0]}" for path, p in laws(assembly) if isinstance(p, Through) and not _of_pair(p)
+    ]
 
 
 def _read_behind_cams(assembly: Assembly) -> list[str]:

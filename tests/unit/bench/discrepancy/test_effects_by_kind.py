@@ -173,3 +173,18 @@ def test_behind_the_play_of_a_gear_is_a_part_of_the_inertia_and_all_of_the_weigh
     springs = [c.location for c in row(machine("elastic_joint"))]
     assert springs == [names["spring"]] * 2
     assert not row(candidate.assembly), "a gear has play once"
+
+
+def test_between_the_pivots_of_a_rolling_pair_no_cable_is_offered() -> None:
+    """The element between them is no cable; under a roller the effects of one are offered still."""
+    cables = [
+        each for each in ALL if each.identifier in ("cable_compliance", "cable_slack", "cable_friction")
+    ]
+    assert len(cables) == 3
+
+    def offered(deck: str) -> set[str]:
+        machine = declare(load_deck(deck))
+        return {each.identifier for each in cables if any(form.places(machine) for form in each.forms)}
+
+    assert offered("rolling_pair_drive") == set()
+    assert offered("roller_cam_drive") == {each.identifier for each in cables}
