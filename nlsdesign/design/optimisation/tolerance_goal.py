@@ -8,7 +8,7 @@ tangent t off all sⱼ, but not off e: a design must not lean on it. The mean sq
 
 with the mean over the angle as product, so mean and variance of Q follow from b and G; the distribution in
 between is taken as that of a multiple of χ² with the same two, whose quantile has a closed form. All
-derivatives are exact. What time takes (:mod:`..tolerance.lasting`) is a share between nothing and the whole, so
+derivatives are exact. What time takes (:mod:`..tolerance.lasting`) is a share between nothing and the whole:
 half of it is added to e, also without its part along the trims.
 """
 
@@ -220,7 +220,7 @@ def lost_by_set(design: DesignPoint) -> Iterator[Expression]:
 
 
 def lost_by_creep(design: DesignPoint) -> Iterator[Expression]:
-    """Yield the torque that relaxation takes after it was measured; its times are those of the declared piece."""
+    """Yield the torque that relaxation takes after it was measured, with its times as declared."""
     if not design.cam.states:
         return
     try:

@@ -90,7 +90,7 @@ def loss_by_relaxation(
 
 
 def relaxed_until_measured(relaxing: ca.Function, extension: float, numbers: Array) -> tuple[Array, Array]:
-    """Return e^(A·t) and its integral until a new spring is measured: what states leave, and rates have grown to.
+    """Return e^(A·t) and its integral until a new spring is measured.
 
     ``relaxing``: function of a :class:`~..statics.equilibrium.RelaxingLaw`, affine in its states.
     """
