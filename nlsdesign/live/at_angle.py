@@ -76,7 +76,7 @@ def mechanism_at(
         holes=(),
         dimensions=(
             ("cam radius", -radius, -low, 0.0, -low, radius),
-            *((("to the guide", 0.0, -low, guide, -low, contour.anchor_distance),) if both else ()),
+            *((("to the guide", 0.0, -low, guide, -low, guide),) if guide == contour.anchor_distance else ()),
             ("rubber", float(clamp[0]), beside, wall, beside, rest_length + extensions[1]),
         ),
         extent=(wall + 2e-3, radius + 1.6 * _THICKNESS),

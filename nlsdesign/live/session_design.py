@@ -219,15 +219,15 @@ class SessionDesign:
         if asked["what"] == "open":
             # Go on from a saved design or a deck, one step that can be undone. What is open stays as it is
             # where the file cannot be read.
-            content, name = base64.b64decode(asked["content"]), plain_letters(str(asked["name"]))
+            content, name = base64.b64decode(asked["content"]), plain_letters(str(asked.get("name", "")))
             live = self._news.live
-            if asked["kind"] == "task":
+            if asked.get("kind") == "task":
                 added = len(live.question.tasks)
                 task = edit(set_task, added, name, 1.0, 1.0, 1.0, record_of(content, name))
                 self._news.answer(live.apply(task), None, None)
                 self._news.settle_soon()
                 return {}
-            if asked["kind"] == "coils":
+            if asked.get("kind") == "coils":
                 self._records.parent.mkdir(parents=True, exist_ok=True)
                 (self._records.parent / name).write_bytes(content)
                 self._news.stock = (CoilStock(self._records.parent / name),)

@@ -190,6 +190,8 @@ class WorkNews:
         if name == Work.DIAGNOSIS:
             # Points and limits belong to the design, not to the machine.
             return (_listed(self._records), live.question.machine, dict(live.question.given))
+        if name == Work.STOCK:
+            return (live.answer.revision,)
         design = live.answer.design
         return live.answer.revision, design is not None and design.checked
 

@@ -104,9 +104,16 @@ def _diagnosis(question: LiveQuestion, _: AngleView | None, folder: Path) -> Cal
 
 def _stock(question: LiveQuestion, _: AngleView | None, choices: tuple[StockChoice, ...]) -> Call:
     """Return the design from each combination of what can be bought; a size that is chosen so is not free."""
+    combinations(question.actuator, choices)  # what does not fit the machine is refused at once
     chosen = {each.chosen for each in choices}
     free = tuple(name for name in question.free if name not in chosen)
-    keep = tuple(each for each in question.keep if getattr(each, "name", "") not in chosen)
+    # What follows from the strength of a rubber, or the travel of a coil, is that of each.
+    follow = {name for name, each in question.limit_values.items() if each.by_default}
+    keep = tuple(
+        each
+        for each in question.keep
+        if type(each).__name__ not in follow and getattr(each, "name", "") not in chosen
+    )
     return through_stock, (question.actuator, question.target, free, keep, choices, question.held_contour)
 
 
@@ -248,8 +255,8 @@ def through_stock(
 
     stage(f"designs {count} springs")
     settings = DesignSettings(
-        starts=1, defaults=(), look_for_size_ranges=False, look_for_remedies=False, draws=0,
-        progress=progress, contour=contour,
+        starts=1, look_for_size_ranges=False, look_for_remedies=False, draws=0, progress=progress,
+        contour=contour,
     )  # fmt: skip
     design = design_cam(actuator, target=target, free=(*free, *choices), keep=keep, settings=settings)
     return {"rows": [(each.choice, each.rms, each.met, each.reason) for each in design.alternatives]}

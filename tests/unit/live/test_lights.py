@@ -131,7 +131,10 @@ def test_what_time_takes_is_told_and_too_much_of_it_is_red(design: CamDesign, qu
     answer, words = will_hold(design, flatten(design.actuator), names)
     assert answer == "yes"
     assert "states no tension_set (ISO 2285)" in words
-    for share, expected, named in ((0.02, "yes", "2 % of the strain at rest stays"), (0.4, "no", "time takes")):
+    for share, expected, named in (
+        (0.02, "yes", "2 % of the strain at rest stays"),
+        (0.4, "no", "time takes"),
+    ):
         stated = f'\\g<0>\ntension_set = {{value = {share}, unit = "1", source = "ISO 2285"}}'
         lasting = with_deck(design, r"^rest_length = .*$", stated)
         made = tolerance_analysis(lasting.actuator, target=design.target, draws=40)
