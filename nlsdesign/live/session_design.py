@@ -24,7 +24,7 @@ from .question import LiveQuestion, finite_in
 from .saved import archived, reopened, unarchived
 from .session_news import TASKS, SessionNews, choices
 from .sessions import plain_letters
-from .tasks import record_of, set_task
+from .tasks import add_record, record_of
 from .views import in_words
 from .work import Work
 
@@ -222,9 +222,7 @@ class SessionDesign:
             content, name = base64.b64decode(asked["content"]), plain_letters(str(asked.get("name", "")))
             live = self._news.live
             if asked.get("kind") == "task":
-                added = len(live.question.tasks)
-                task = edit(set_task, added, name, 1.0, 1.0, 1.0, record_of(content, name))
-                self._news.answer(live.apply(task), None, None)
+                self._news.answer(live.apply(edit(add_record, name, record_of(content, name))), None, None)
                 self._news.settle_soon()
                 return {}
             if asked.get("kind") == "coils":

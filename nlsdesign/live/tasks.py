@@ -20,16 +20,15 @@ from ..design import (
     OddSpring,
     OneSidedSpring,
     TabulatedTorque,
-    Task,
     TaskCurve,
     TaskProblem,
     curve_for_task,
     motor_and_gear,
     motor_cycle,
-    read_task,
     walking_task,
 )
 from ..design.curves.numbers import plain
+from ..design.curves.task import Task, read_task
 from ..design.parametric.cam_question import TargetPoint
 from ..foundation.arrays import Array
 from ..foundation.errors import ArrangementError, InfeasibleError, NlsError, ValueRangeError, unknown_name
@@ -48,6 +47,8 @@ _MOST_ROWS = 60
 """Rows of the table in which a designed spring is held against tasks."""
 _RECORD, _MOST_RECORD = 200, 2000
 """Times of one period at which a record of one's own is kept, and most of them that are reopened."""
+_USUAL_MASS = 75.0
+"""Assumed: body mass in kg of a record whose torque is per mass, until another is given."""
 _TAKEN = "gear ratio {:g}:1, taken over from the live page"
 _MOTOR = {"resistance": (1e-6, 1e6, "Ohm"), "gear_ratio": (1e-3, 1e4, "1")}
 """Numbers of the motor that a designer may give: their range and unit."""
@@ -55,13 +56,12 @@ _MOTOR = {"resistance": (1e-6, 1e6, "Ohm"), "gear_ratio": (1e-3, 1e4, "1")}
 
 def set_task(
     question: LiveQuestion, _: AngleView | None, index: int, joint: str, body_mass: float,
-    scale: float | None = None, share: float = 1.0, record: TaskRecord | None = None,
+    scale: float | None = None, share: float = 1.0,
 ) -> LiveQuestion:  # fmt: skip
     """Set a task, counted from 0; one after the last is added.
 
     ``joint``: or the name of a record that is there; ``body_mass``: in kg; ``scale``: part of the torque of
-    the joint that the actuator gives, for ``None`` as much as the target has; ``share``: of the time;
-    ``record``: in the place of walking.
+    the joint that the actuator gives, for ``None`` as much as the target has; ``share``: of the time.
     """
     if not 0 <= index <= min(len(question.tasks), MOST_TASKS - 1):
         raise ValueRangeError(
@@ -70,7 +70,7 @@ def set_task(
         )  # fmt: skip
     mass = finite_in("body mass in kg", body_mass, lowest=1.0, highest=500.0)
     known = {each.joint: each.record for each in question.tasks}
-    asked = AskedTask(joint, mass, 1.0, 1.0, record or known.get(joint))
+    asked = AskedTask(joint, mass, 1.0, 1.0, known.get(joint))
     whole = float(np.max(np.abs(_task(asked).sampled().torque)))
     wanted = float(f"{question.target_size / whole:.2g}") if scale is None else scale
     asked = asked._replace(
@@ -80,6 +80,14 @@ def set_task(
     tasks = list(question.tasks)
     tasks[index : index + 1] = [asked]
     return replace(question, tasks=tuple(tasks))
+
+
+def add_record(question: LiveQuestion, _: AngleView | None, name: str, record: TaskRecord) -> LiveQuestion:
+    """Add a task of one's own with the whole of its torque; ``name``: of the file."""
+    if len(question.tasks) >= MOST_TASKS:
+        raise ValueRangeError(f"task '{name}'", f"is one more than {MOST_TASKS}", next_step="drop one first")
+    own = AskedTask(name, _USUAL_MASS if record.per_mass else 1.0, 1.0, 1.0, record)
+    return replace(question, tasks=(*question.tasks, own))
 
 
 def record_of(content: bytes, name: str) -> TaskRecord:
@@ -178,7 +186,9 @@ def reopened_tasks(question: LiveQuestion, rows: object, motor: object) -> LiveQ
     for index, row in enumerate(rows if isinstance(rows, list) else ()):
         if not (isinstance(row, list) and len(row) in (4, 5) and isinstance(row[0], str)):
             raise ValueRangeError(f"live.toml: task {index + 1}", "is no row of joint and three numbers")
-        question = set_task(question, None, index, *row[:4], *(_reopened_record(each) for each in row[4:]))
+        for each in row[4:]:
+            question = add_record(question, None, row[0], _reopened_record(each))
+        question = set_task(question, None, index, *row[:4])
     for name, value in motor.items() if isinstance(motor, dict) else ():
         question = set_motor(question, None, str(name), value)
     return question

@@ -18,14 +18,16 @@ import pytest
 
 import nlsdesign as nls
 from nlsdesign.bench.identification import load_records
-from nlsdesign.design import tolerance_analysis
+from nlsdesign.design import RubberStock, tolerance_analysis
 from nlsdesign.design.statics.equilibrium import equilibrium_torque
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.foundation.locations import folder
 from nlsdesign.foundation.rubber_library import materials
+from nlsdesign.live.edits import change_limit, edit
 from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.sessions import Uploads
+from nlsdesign.live.work import _stock
 from tests.command_line import Run, run
 from tests.live_session import Message, Session, as_csv, bench_records, session
 from tests.unit.bench.identification.test_tables import WRITERS
@@ -422,6 +424,14 @@ def test_a_stock_is_designed_and_one_of_it_taken(one: Session) -> None:
     assert (size[1], size[4]) == (pytest.approx(5e-5), False), "held at what was bought"
     assert "chosen from the stock" in size[7]
     assert "is not there" in one.ask(what="stock", take=7)["reason"]
+
+
+def test_what_follows_from_a_rubber_is_not_asked_of_another(one: Session) -> None:
+    """The strength of the declared rubber is no limit of one that is bought."""
+    asked = edit(change_limit, "MaximumCamRadius", 0.05).applied(one.live.question)
+    assert "MaximumStress" in asked.limit_values
+    _, (_, _, _, keep, _, _) = _stock(asked, None, (RubberStock(("PMC-770",)),))
+    assert {type(each).__name__ for each in keep} == set(asked.limits)
 
 
 # Quicker: the test of a size above.

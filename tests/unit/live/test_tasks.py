@@ -20,6 +20,7 @@ from nlsdesign.live.tasks import (
     MOST_TASKS,
     MotorRow,
     _task,
+    add_record,
     drop_task,
     follow_tasks,
     motor_over_tasks,
@@ -185,10 +186,8 @@ def written(rows: str, per_mass: bool) -> bytes:
     return f"{head}\n{rows}".replace(".", ",").encode("cp1252")
 
 
-ROWS = "".join(
-    f"{10.0 * k:.1f};{20.0 * math.sin(2 * math.pi * k / 100):.6f};{0.4 * math.sin(2 * math.pi * k / 100):.6f}\n"
-    for k in range(101)
-)
+SWING = [math.sin(2.0 * math.pi * k / 100) for k in range(101)]
+ROWS = "".join(f"{10.0 * k:.1f};{20.0 * s:.6f};{0.4 * s:.6f}\n" for k, s in enumerate(SWING))
 
 
 @pytest.mark.parametrize("per_mass", [False, True], ids=["torque", "per mass"])
@@ -196,7 +195,9 @@ def test_a_record_of_ones_own_is_a_task(per_mass: bool) -> None:
     question = gallery_question("cam-actuator")
     record = record_of(written(ROWS, per_mass), "squat.csv")
     assert (record.period, record.per_mass) == (pytest.approx(1.0), per_mass)
-    own = edit(set_task, 0, "squat.csv", 2.0, 1.0, 1.0, record).applied(question)
+    own = edit(set_task, 0, "squat.csv", 2.0, 1.0).applied(
+        edit(add_record, "squat.csv", record).applied(question)
+    )
     assert own.tasks[0].row == ("squat.csv", 2.0, 1.0, 1.0, "per mass" if per_mass else "own")
     largest = 0.8 if per_mass else 0.4
     assert _task(own.tasks[0]).sampled().torque.max() == pytest.approx(largest, rel=1e-4)
@@ -206,6 +207,9 @@ def test_a_record_of_ones_own_is_a_task(per_mass: bool) -> None:
     changed = edit(set_task, 0, "squat.csv", 2.0, 0.5).applied(own)
     assert changed.tasks[0].record == record
     assert reopened(saved(changed, {}))[0].tasks == changed.tasks
+    many = replace(changed, tasks=MOST_TASKS * changed.tasks)
+    with pytest.raises(ValueRangeError, match="drop one first"):
+        edit(add_record, "other.csv", record).applied(many)
 
 
 def test_a_record_that_is_none_says_why() -> None:
