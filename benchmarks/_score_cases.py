@@ -46,6 +46,7 @@ ACCEPTED: Mapping[str, frozenset[str]] = {
     "constant_force": frozenset({"constant_torque", "constant_force", "current_sensor_bias"}),
     "current_sensor_bias": frozenset({"current_sensor_bias", "constant_torque", "constant_force"}),
     "joint_coulomb_friction": frozenset({"coulomb_friction@load"}),
+    "soft_centre": frozenset({"soft_windup"}),
     "gravity_load": frozenset({"gravity_load@load"}),
     "angle_sensor_bias": frozenset({"angle_sensor_bias@load"}),
     "angle_sensor_delay": frozenset({"angle_sensor_delay@load"}),

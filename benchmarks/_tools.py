@@ -10,7 +10,7 @@ from pathlib import Path
 
 def run_tool(command: Sequence[str], folder: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run a program; one that is missing, fails or dies ends the benchmark with a sentence."""
-    name = "the compiler ziglang" if "ziglang" in command else command[0]
+    name = "the compiler ziglang" if any("ziglang" in each for each in command[:3]) else command[0]
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder)
     except OSError as error:

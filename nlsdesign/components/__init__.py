@@ -33,7 +33,7 @@ from .core.series import Series, series
 from .core.springs import Dashpot, FittedRange, LinearElastic, Spring, StrainStiffening, ViscousMaterial
 from .materials.arruda_boyce import ArrudaBoyce
 from .materials.finite_viscoelasticity import FlowingChains
-from .materials.hardening import HardeningSpring
+from .materials.hardening import HardeningSpring, SoftWindup
 from .materials.hyperelastic import ExtendedTube, Hyperelastic, NeoHooke, Ogden, Yeoh
 from .materials.loss_tangent import (
     KnownLoss,
@@ -231,6 +231,7 @@ __all__ = [
     "Slack",
     "SlidingFillers",
     "SlidingGuide",
+    "SoftWindup",
     "Specimen",
     "SpeedLoop",
     "SpotFriction",

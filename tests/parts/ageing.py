@@ -16,6 +16,7 @@ from nlsdesign.components import (
     Part,
     PermanentSet,
     SelfHeating,
+    SoftWindup,
     Spring,
     StressSoftening,
     ViscousHeat,
@@ -39,6 +40,8 @@ _PARTS: tuple[Part, ...] = (
     BoucWen(stiffness=0.4, yield_effort=0.03, exponent=1.0, domain=ROTATION),
     BoucWen(stiffness=4e5, yield_effort=3e4, exponent=2.0, domain=MATERIAL),
     HardeningSpring(cubic=3e6, scale=0.01),
+    SoftWindup(missing=200.0, width=5e-3),
+    SoftWindup(missing=2.0, width=0.1, domain=ROTATION),
     HardeningSpring(cubic=2.0, scale=0.4, domain=ROTATION),
     HardeningSpring(cubic=7e5, scale=0.3, domain=MATERIAL),
 )

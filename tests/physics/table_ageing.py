@@ -57,6 +57,12 @@ ROWS: tuple[Row, ...] = (
         _HERE + "a_hardening_spring_is_a_cubic_at_first",
     ),
     Row(
+        c.SoftWindup,
+        "work",
+        ("force beside a spring", "the integral of the stiffness over the motion, by quadrature"),
+        _HERE + "a_soft_windup_lacks_its_stiffness_around_rest_alone",
+    ),
+    Row(
         c.CapstanFriction,
         "capstan",
         ("force", "Euler's differential equation along the wrap, integrated"),

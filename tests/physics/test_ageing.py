@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from scipy.integrate import cumulative_trapezoid, solve_ivp, trapezoid
+from scipy.integrate import cumulative_trapezoid, quad, solve_ivp, trapezoid
 
 from nlsdesign.components import (
     TRANSLATION,
@@ -22,11 +22,13 @@ from nlsdesign.components import (
     LossHeat,
     PermanentSet,
     SelfHeating,
+    SoftWindup,
     Spring,
     StressSoftening,
     ViscousHeat,
     WorkHeat,
     WrapProduct,
+    parallel,
     specimen,
     tie,
 )
@@ -203,6 +205,17 @@ def test_a_hardening_spring_is_a_cubic_at_first() -> None:
         assert model.evaluate([], [x, 0.0])["piece.force"] == pytest.approx(slope, rel=1e-6)
     below, above = (model.evaluate([], [0.1 * scale * f, 0.0])["piece.force"] for f in (1 - 1e-9, 1 + 1e-9))
     assert below == pytest.approx(above, rel=1e-8)
+
+
+def test_a_soft_windup_lacks_its_stiffness_around_rest_alone() -> None:
+    missing, width = 0.6 * K, 2e-3
+    model = pulled(parallel(spring=Spring(stiffness=K), windup=SoftWindup(missing=missing, width=width)))
+    for x in (-0.05, -1e-3, 2e-3, 0.03):
+        force = model.evaluate([], [x, 0.0])["piece.force"]
+        by_hand, _ = quad(lambda at: K - missing / np.cosh(at / width) ** 2, 0.0, x, epsabs=1e-12)
+        assert force == pytest.approx(by_hand, rel=1e-9)
+    # Far out the force is that of a spring behind a dead zone as wide as twice w, by the missing share.
+    assert force == pytest.approx(K * 0.03 - missing * width, rel=1e-9)
 
 
 def test_heat_needs_work() -> None:

@@ -8,12 +8,12 @@ spline of :mod:`tests.rig.published`, a little larger or smaller as a whole.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi
+from math import exp, pi
 from pathlib import Path
 
 import numpy as np
 
-from .bench import prox
+from .bench import plain, prox
 from .published import PUBLISHED, RUBBER
 
 STEP = 1.0e-4  # s: slow motions, no contact
@@ -79,18 +79,19 @@ def _run(
     spring: bool = True,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angle, current and spring torque over time; with a wanted angle a servo adds to the current."""
+    machine = plain(machine)
     extension, lever = (table.tolist() for table in _tables(machine))
     per_ampere = machine.ratio * machine.torque_constant
     nominal = 5.97e-4 * 60.0 / 0.22
     k_p, k_d = nominal * 60.0, 1.6 * nominal
-    wanted_rate = np.gradient(wanted, STEP) if wanted is not None else None
+    goals = current if wanted is None else wanted
+    paces, hanging = np.gradient(goals, STEP).tolist(), (weight * machine.weight_factor).tolist()
     angle = speed = flow = 0.0
     ramps = list(zip(machine.stiff, machine.strains, strict=True))
     rows = []
-    for k in range(len(current)):
-        i = current[k]
-        if wanted is not None and wanted_rate is not None:
-            i += k_p * (wanted[k] - angle) + k_d * (wanted_rate[k] - speed)
+    for i, goal, pace, load in zip(current.tolist(), goals.tolist(), paces, hanging, strict=True):
+        if wanted is not None:
+            i += k_p * (goal - angle) + k_d * (pace - speed)
             i = min(max(i, -20.0), 20.0)
         torque = machine.stiffness * angle if spring else 0.0
         if spring and not machine.stiffness:
@@ -104,12 +105,10 @@ def _run(
             flow += STEP * hung / machine.viscosity
             torque = 2.0 * arm * machine.area * (stress + hung) * (1.0 if angle >= 0.0 else -1.0)
         rows.append((angle, i, torque))
-        push = per_ampere * i - torque - weight[k] * machine.weight_factor - machine.damping * speed
-        level = (
-            machine.friction + machine.breakaway * np.exp(-((speed / 0.3) ** 2))
-            if machine.breakaway
-            else machine.friction
-        )
+        push = per_ampere * i - torque - load - machine.damping * speed
+        level = machine.friction
+        if machine.breakaway:
+            level += machine.breakaway * exp(-((speed / 0.3) ** 2))
         speed = prox(speed + STEP * push / machine.inertia, STEP * level / machine.inertia)
         angle += STEP * speed
     angles, currents, torques = np.array(rows).T

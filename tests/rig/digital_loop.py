@@ -152,11 +152,12 @@ def run(
     whole, part = divmod(late, steps)
     following, flowing = controller.begun(), 0.0
     share = 1.0 - exp(-step / controller.lag) if controller.lag else 0.0
+    effort_per_ampere = float(effort_per_ampere)
     for tick, (goal, pace, bend) in enumerate(
         zip(wanted.place.tolist(), wanted.speed.tolist(), wanted.acceleration.tolist(), strict=True)
     ):
         shown = eccentric(world.place, missing) if missing.eccentricity and disc_on_motor else world.place
-        commands.append(following(goal, pace, bend, shown))
+        commands.append(float(following(goal, pace, bend, shown)))
         rows.append((world.place, world.load_place, commands[-1]))
         older, newer = commands[-2 - whole], commands[-1 - whole]
         beside = push[tick * steps : (tick + 1) * steps].tolist()

@@ -122,14 +122,14 @@ ELASTIC_JOINT = replace(
     effects=(
         *_FRICTION, "joint_coulomb_friction", "load_dependent_friction", *_DRIVE, "backlash",
         "drivetrain_resonance", "gravity_load", "joint_eccentricity", "spring_damping",
-        "angle_sensor_bias", "angle_sensor_delay",
+        "angle_sensor_bias", "angle_sensor_delay", "soft_centre",
     ),
     pairs=(
         ("coulomb_friction", "joint_coulomb_friction"), ("coulomb_friction", "gravity_load"),
         ("load_dependent_friction", "torque_ripple"), ("backlash", "coulomb_friction"),
         ("viscous_friction", "coulomb_friction"), ("angle_sensor_bias", "stribeck_friction"),
     ),
-    not_listed=("soft_centre", "stiffness_over_angle", "payload_change", "periodic_disturbance"),
+    not_listed=("stiffness_over_angle", "payload_change", "periodic_disturbance"),
 )  # fmt: skip
 DIRECT_DRIVE = replace(
     GEARED_JOINT,
@@ -175,12 +175,13 @@ BELT_AXIS = replace(
     effects=(
         *_FRICTION, "joint_coulomb_friction", "load_dependent_friction", *_DRIVE, "backlash",
         "spring_damping", "angle_sensor_bias", "angle_sensor_delay", "joint_eccentricity",
+        "soft_centre",
     ),
     pairs=(
         ("coulomb_friction", "joint_coulomb_friction"), ("backlash", "coulomb_friction"),
         ("viscous_friction", "coulomb_friction"), ("torque_ripple", "spring_damping"),
     ),
-    not_listed=("soft_centre", "stiffness_over_angle", "periodic_disturbance", "external_push"),
+    not_listed=("stiffness_over_angle", "periodic_disturbance", "external_push"),
 )  # fmt: skip
 SCREW_CARRIAGE = replace(
     GEARED_JOINT,

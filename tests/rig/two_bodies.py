@@ -14,9 +14,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import exp, pi, sin
+from math import erf, exp, pi, sin, sqrt
 
-from .bench import prox
+from .bench import plain, prox
 
 STEP = 1.0e-4  # s
 
@@ -83,8 +83,8 @@ class TwoBodies:
     """The plant in time: `advance` takes the effort of each step, and the state is there to be read."""
 
     def __init__(self, plant: Plant, missing: Missing, step: float = STEP) -> None:
-        self.plant, self.missing, self.step = plant, missing, step
-        self.place = self.load_place = plant.hanging_angle
+        self.plant, self.missing, self.step = plain(plant), plain(missing), step
+        self.place = self.load_place = self.plant.hanging_angle
         self.speed = self.load_speed = 0.0
         self.tail_place, self.tail_speed = self.load_place, 0.0
 
@@ -97,8 +97,9 @@ class TwoBodies:
                 return 0.0, 0.0
             lead = lead - half if lead > 0.0 else lead + half
         stiffness = plant.stiffness
-        if missing.soft_centre:
-            stiffness *= 1.0 - missing.soft_centre * exp(-((lead / missing.soft_width) ** 2))
+        if missing.soft_centre:  # the integral of a stiffness that lacks a share s·exp(−(x/w)²)
+            width = missing.soft_width
+            lead -= missing.soft_centre * 0.5 * sqrt(pi) * width * erf(lead / width)
         if missing.stiffness_wave:
             stiffness *= 1.0 + missing.stiffness_wave * sin(2.0 * place + missing.wave_phase)
         return stiffness * lead, plant.spring_damping

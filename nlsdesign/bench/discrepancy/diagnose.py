@@ -36,13 +36,14 @@ from .effects.sensing import delays
 from .fitting import Key
 from .planning.experiment import Experiment, next_experiment, write_command
 from .reporting.advice import advice, more_excitation, where_they_differ
-from .reporting.named_effect import EffectEvidence
+from .reporting.named_effect import STRAINED, EffectEvidence
 from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
 from .screening.causality import lagging_forces, modes_too_quick
 from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
 from .screening.wrong_numbers import (
+    far_numbers,
     is_explained_by_numbers,
     other_numbers,
     out_of_reach,
@@ -61,8 +62,6 @@ from .tearing import blocks_of
 _CRITERIA = Criteria()
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 """So many of each are shown; a longer list is not read."""
-_FAR, _MOST_FAR = 2.0, 4
-"""Standard deviations of its spread from which a refitted number is called by its name, and how many are."""
 
 
 @dataclass(frozen=True)
@@ -233,7 +232,9 @@ class _Case:
             fitted = [(case, beside) for case, beside in begun if beside is not None]
             if not (delay and fitted):
                 continue
-            early, beside = min(fitted, key=lambda each: _chi2(each[0].excesses(each[1])))
+            early, beside = min(
+                fitted, key=lambda each: sum(e.chi2 for e in each[0].excesses(each[1]).values())
+            )
             read = early.bench.inferred(self._blocks(sourced(beside)), no_terms)
             other = early._read_as(read, _SAME_SAMPLING)
             again = other._beginning_with(delay) if other else None
@@ -274,11 +275,11 @@ class _Case:
         return self._with_records(records)
 
     def _with_records(self, records: RecordSet) -> _Case:
-        bench = Bench(records, self._blocks(self.actuator))
+        bench = self.bench.read_otherwise(records)
         sizes = typical_sizes(self.actuator, bench.records)
         return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
 
-    def _blocks(self, assembly: Assembly) -> list[Block]:
+    def _blocks(self, assembly: Assembly) -> Sequence[Block]:
         return blocks_of(flatten(assembly), self.bench.records.signals)
 
 
@@ -303,10 +304,6 @@ def _answer_anew(
     case = replace(case, settled=True)
     base = case.comparison.base(case.actuator)
     return _Answer(case, base, *_decided(case, base, catalogue, progress))
-
-
-def _chi2(left: Excesses) -> float:
-    return sum(each.chi2 for each in left.values())
 
 
 def _leaves_nothing(left: Excesses) -> bool:
@@ -388,8 +385,13 @@ def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     if wrong:
         other = other_numbers(case.comparison, base, base, case.criteria)
         return _Decision("data_suspect", (other.words if other.decides else wrong,))
-    if not any(e.open for e in case.excesses(base).values()):
+    open_blocks = {name for name, each in case.excesses(base).items() if each.open}
+    if not open_blocks:
         verdict = "none"
+    elif open_blocks == {DECLARED} and not outcome.steps:
+        far = ", ".join(far_numbers(base)) or "together, none of them alone"
+        why = f"{STRAINED}: {far}; measure one of them, or widen its spread in the deck"
+        return _Decision("data_suspect", (why,))
     else:
         undecided = any(each.undecided for each in outcome.tried)
         verdict = "named" if outcome.steps else "undecidable" if undecided else "unknown"
@@ -425,7 +427,7 @@ def _verdict(answer: _Answer, records: RecordSet) -> Verdict:
     return Verdict(
         verdict,
         tuple(_named(judged, better, step, place, left) for place, step in enumerate(steps)),
-        ((_strained(before[DECLARED], after[DECLARED], better),) if before[DECLARED].open else ())
+        _strained(before[DECLARED], after[DECLARED], better)
         + tuple(_not_predicted(key) for key in unpredictable)
         + decision.findings,
         gaps_of(base, better, every),
@@ -510,14 +512,15 @@ def _next_steps(comparison: Comparison, steps: Sequence[Step], fits: Sequence[Fi
     return (*sentences, *more_excitation(fits))
 
 
-def _strained(before: Excess, after: Excess, better: Hypothesis) -> str:
-    scores = {n: z for f in better.fits.values() for n, z in f.prior_z_scores().items()}
-    far = sorted((n for n, z in scores.items() if abs(z) >= _FAR), key=lambda n: -abs(scores[n]))[:_MOST_FAR]
-    sides = (f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far)
-    which = f": {', '.join(sides)}" if far else ""
+def _strained(before: Excess, after: Excess, better: Hypothesis) -> tuple[str, ...]:
+    """Return how far refitted numbers lie from their declaration, where all are far together or one is."""
+    far = far_numbers(better)
+    if not (before.open or far):
+        return ()
+    which = f": {', '.join(far)}" if far else ""
     return (
         f"{DECLARED}: refitted {before.fit:.1f} standard deviations of their spread away before, "
-        f"{after.fit:.1f} after{which}"
+        f"{after.fit:.1f} after{which}",
     )
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from ...foundation.arrays import Array
 from ...foundation.errors import MeasurementError
 from ...foundation.quantity import same_dimension
-from ...foundation.symbolic import Expression
+from ...foundation.symbolic import Expression, remembered
 from ...model import FlatModel, Variable
 from ...model.flat import Symbols
 from ...model.readings import ReadingNames, reading_of
@@ -219,7 +219,8 @@ def _singular(terms: BalanceTerms, matrix: Expression) -> bool:
     return not np.all(np.isfinite(values)) or np.linalg.matrix_rank(values) < len(values)
 
 
-def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
+@remembered(32)
+def blocks_of(model: FlatModel, signals: Sequence[str]) -> tuple[Block, ...]:
     """Cut a model at measured signals.
 
     Every measured force or torque gives a block that predicts it from what else is measured; so does the
@@ -247,7 +248,7 @@ def blocks_of(model: FlatModel, signals: Sequence[str]) -> list[Block]:
             "measure no motion that drives the model, or nothing to compare it with",
             next_step=_what_to_measure(model, drives, unknown, signals),
         )
-    return sound
+    return tuple(sound)
 
 
 class _Sorted(NamedTuple):

@@ -1,4 +1,4 @@
-"""A spring that grows stiffer without a corner."""
+"""Springs that grow stiffer without a corner."""
 
 from __future__ import annotations
 
@@ -47,3 +47,31 @@ class HardeningSpring(Elastic):
         series = 1 + square / 20 * (1 + square / 42 * (1 + square / 72))
         factor = ca.if_else(near, series, 6 * (ca.sinh(far) - far) / far**3)
         return scope.parameter("cubic") * motion**3 * factor
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoftWindup(Elastic):
+    """What a spring lacks around its rest: F = −c·w·tanh(x/w), a stiffness k becomes k − c/cosh²(x/w).
+
+    Stands beside a spring that is stiffer than c: a strain wave gear, or a coupling, whose teeth carry one
+    after the other. Beyond w only the constant effort c·w is missing, as behind a dead zone of 2·w where c is
+    k. Source: Tuttle 1992 (soft wind-up of a strain wave gear); the tanh is this project's.
+
+    Examples
+    --------
+    >>> SoftWindup(missing=2e3, width=1e-3, domain=ROTATION).domain.effort
+    'torque'
+    """
+
+    phenomena: ClassVar[frozenset[str]] = frozenset({"elasticity", "soft wind-up"})
+
+    domain: Domain = one_of(TRANSLATION, ROTATION)
+    missing: Quantity = parameter(
+        "{effort}/{motion}", "stiffness c missing at rest", minimum=0.0, maximum=1e12
+    )
+    width: Quantity = parameter("{motion}", "motion w over which it is missing", minimum=1e-9, maximum=10.0)
+
+    def effort(self, scope: Scope, motion: Expression, rate: Expression) -> Expression:
+        """Return −c·w·tanh(x/w)."""
+        width = scope.parameter("width")
+        return -scope.parameter("missing") * width * ca.tanh(motion / width)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from scipy.interpolate import BPoly
@@ -13,6 +12,7 @@ from scipy.interpolate import BPoly
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import MM, Quantity
+from ...foundation.symbolic import remembered
 from ..statics.contour import Contour
 from .arc_path import ArcPath, biarc, clockwise_arc, joined, line
 
@@ -41,7 +41,7 @@ Lips = tuple[LipEdge, LipEdge]
 """Edges under the cable at positive and at negative angles."""
 
 
-@lru_cache(maxsize=4)  # both lips of a cam are alike, and bolts are tried on one edge after the other
+@remembered(8)
 def lip_edge(contour: Contour, cable_radius: float, *, over_travel: float) -> LipEdge:
     """Return the edge on which a cable has its centre line on the contour.
 

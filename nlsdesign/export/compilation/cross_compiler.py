@@ -83,13 +83,19 @@ def chosen_platforms(names: Sequence[str] | None) -> list[Platform]:
 
 def compiler() -> list[str]:
     """Return the command of the C compiler."""
-    if find_spec("ziglang") is None:
+    # The program itself: ``python -m ziglang`` would start Python only to find it.
+    return [str(_compilers_folder() / ("zig.exe" if sys.platform == "win32" else "zig")), "cc"]
+
+
+def _compilers_folder() -> Path:
+    wheel = find_spec("ziglang")
+    if wheel is None or wheel.origin is None:
         raise ExportError(
             "the C compiler",
             "is not installed",
             next_step="pip install 'nlsdesign[export]' (the wheel ziglang)",
         )
-    return [sys.executable, "-m", "ziglang", "cc"]
+    return Path(wheel.origin).parent
 
 
 def cache_folder() -> Path:
@@ -155,8 +161,7 @@ def compile_library(
         # Arguments that omit the start-up code of Windows libraries, see the template for the reason.
         start = target.parent / "windows.c"
         start.write_text(template("windows.c"), encoding="utf-8")
-        home = Path(str(getattr(find_spec("ziglang"), "origin", ""))).parent
-        headers = home / "lib" / "libc" / "include" / "any-windows-any"
+        headers = _compilers_folder() / "lib" / "libc" / "include" / "any-windows-any"
         arguments += ["-nostdlib", "-isystem", headers, start, "-lucrtbase", "-lkernel32"]
     for folder in include:
         arguments += ["-isystem", folder]

@@ -1,4 +1,4 @@
-"""Effects of a piece of rubber: more relaxation, hysteresis that knows no rate, stiffening."""
+"""Effects of rubber or another spring: more relaxation, hysteresis that knows no rate, stiffening."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from ....components import (
     LinearElastic,
     Rounded,
     SlidingFillers,
+    SoftWindup,
     Specimen,
     Spring,
     StrainStiffening,
@@ -195,6 +196,17 @@ def _lumped_stiffening(assembly: Assembly, path: str) -> Iterator[Edit]:
     yield from _hardening(assembly, path, 1.0, (f"{effort} / {motion}", motion))
 
 
+def _soft_windup(assembly: Assembly, path: str) -> Iterator[Edit]:
+    domain, (effort, motion) = assembly.element(path).domain, effort_over_motion(assembly, path)
+    missing, width = number(0.0, domain.unit("{effort}/{motion}")), number(1.0, domain.motion_unit)
+    edited, inner = beside(assembly, path, "windup", SoftWindup(missing=missing, width=width, domain=domain))
+    unknowns = (
+        Unknown(f"{inner}.missing", (0.4,), 1e-4, 0.95, f"{effort} / {motion}"),
+        Unknown(f"{inner}.width", (0.1, 0.3), 0.02, 0.7, motion, null=None),
+    )
+    yield Edit(edited, unknowns)
+
+
 second_relaxation = Effect(
     "second_relaxation",
     "One more relaxing branch in a piece of material, or one or two at large stretch.",
@@ -258,6 +270,20 @@ strain_stiffening = Effect(
             "effort that grows more than declared where the motion is large, the same at any speed",
             "Fung 1967; Ogden 1972",
             "strain stiffening",
+        ),
+    ),
+)
+soft_windup = Effect(
+    "soft_windup",
+    "A spring that is softer around its rest than beyond.",
+    178,
+    (
+        Form(
+            lumped_springs_without("soft wind-up"),
+            _soft_windup,
+            "effort that grows less than declared where the motion is small, the same at any speed",
+            "Tuttle 1992",
+            "soft wind-up",
         ),
     ),
 )

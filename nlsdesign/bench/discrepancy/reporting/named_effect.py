@@ -144,6 +144,8 @@ LET_GO = (
     "these numbers first, and whether the records are of this rig.",
 )
 """Headline and explanation where other numbers explain the records: then these need not be suspect."""
+STRAINED = "declared numbers are probably wrong"
+"""Begins the reason where a refit leaves nothing, but lies far from what is declared."""
 CONTRADICTION = "deck and records contradict each other, so nothing is named"
 """Why an effect that explains much is not named all the same."""
 

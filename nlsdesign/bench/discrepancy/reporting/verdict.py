@@ -26,7 +26,15 @@ from ..selection.measures import DECLARED
 from ..selection.trials import Skipped
 from .circumstances import DiagnosisRun, settings_of
 from .fitted_numbers import fitted_numbers
-from .named_effect import CONTRADICTION, LET_GO, Numbers, as_sentence, listed_numbers, numbers_in_words
+from .named_effect import (
+    CONTRADICTION,
+    LET_GO,
+    STRAINED,
+    Numbers,
+    as_sentence,
+    listed_numbers,
+    numbers_in_words,
+)
 from .named_effect import NamedEffect as NamedEffect
 from .remainder import Remainder
 
@@ -412,7 +420,8 @@ def details_of(verdict: Verdict) -> tuple[str, ...]:
 
 def let_go(verdict: Verdict) -> bool:
     """Return whether the records contradict declared numbers, and other numbers explain them."""
-    return verdict.verdict == "data_suspect" and any(verdict.gap(name).changed for name in verdict.blocks)
+    changed = verdict.verdict == "data_suspect" and any(verdict.gap(name).changed for name in verdict.blocks)
+    return changed or any(text.startswith(STRAINED) for text in suspicions(verdict))
 
 
 def suspicions(verdict: Verdict) -> tuple[str, ...]:

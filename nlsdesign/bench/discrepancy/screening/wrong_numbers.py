@@ -34,6 +34,8 @@ _OUTSIDE = 3.0
 """Declared standard deviations beyond which a number was declared wrongly; a refit stops there."""
 _CERTAIN = 2.0
 """Standard errors by which it must lie beyond."""
+_MENTIONED, _MOST_MENTIONED = 2.0, 4
+"""Declared standard deviations from which a refitted number is called by its name, and how many are."""
 
 
 def with_numbers_let_go(
@@ -89,6 +91,15 @@ def wrong_numbers(hypothesis: Hypothesis) -> list[str]:
                 f"{abs(moved) / width:.1f} standard deviations away"
             )
     return words
+
+
+def far_numbers(hypothesis: Hypothesis) -> list[str]:
+    """Return the refitted numbers that are far from what is declared, and how many standard deviations."""
+    scores = {n: z for f in hypothesis.fits.values() for n, z in f.prior_z_scores().items()}
+    far = sorted((n for n, z in scores.items() if abs(z) >= _MENTIONED), key=lambda n: -abs(scores[n]))[
+        :_MOST_MENTIONED
+    ]
+    return [f"{n} {abs(scores[n]):.1f} {'above' if scores[n] > 0.0 else 'below'}" for n in far]
 
 
 def is_explained_by_numbers(

@@ -42,6 +42,8 @@ from numpy.typing import NDArray
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import MeasurementError
 from ....foundation.quantity import with_unit
+from ....foundation.symbolic import remembered
+from ....simulation import Trace
 from ..filters import Smoothing, blur_weights, difference, filter_weights, filtered, smoothing
 from ..records.measurement import Record, RecordSet
 from ..residuals import rmse
@@ -301,9 +303,9 @@ def rate_span(records: Sequence[Record], signal: str) -> float:
     """Return the time in s over which the rate of a measured signal is taken; zero where it does not move."""
     resolutions = [r.resolution_of(signal) for r in records]
     noise = float(np.median([max(g.noise, g.quantum / math.sqrt(12.0)) for g in resolutions]))
-    runs = [(r.trace[signal], r.step) for r in records]
+    runs = tuple((r.trace, r.step) for r in records)
     # Whoever takes a rate alone, as where a simulation begins, wants that of a sharp reversal too.
-    pace = max(_bounded_pace(runs, noise, order) for order in (1, 2))
+    pace = max(_bounded_pace(runs, signal, noise, order) for order in (1, 2))
     return SPAN / pace if pace else 0.0
 
 
@@ -315,16 +317,17 @@ def paces(blocks: Sequence[Block], records: Sequence[Record], noise: Noise) -> d
         for signal, highest in _deciding(block).items()
         for order in range(1, highest + 1)
     )
+    runs = tuple((r.trace, r.step) for r in records)
     return {
-        (signal, order): _bounded_pace(
-            [(r.trace[signal], r.step) for r in records], noise.deviation(signal), order
-        )
+        (signal, order): _bounded_pace(runs, signal, noise.deviation(signal), order)
         for signal, order in wanted
     }
 
 
-def _bounded_pace(signals: Sequence[tuple[Array, float]], noise: float, order: int) -> float:
+@remembered(16)  # the same records are asked again each time that they are read otherwise
+def _bounded_pace(runs: Sequence[tuple[Trace, float]], signal: str, noise: float, order: int) -> float:
     """Return the pace of a derivative; that of an acceleration no quicker than its noise allows."""
+    signals = [(trace[signal], step) for trace, step in runs]
     pace = pace_of(signals, noise, order)
     return min(pace, BALANCE / _quiet_width(signals, noise, order)) if order > 1 and pace else pace
 

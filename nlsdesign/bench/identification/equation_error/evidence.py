@@ -15,9 +15,10 @@ as measured. Records that show everything already stay as they are.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -124,9 +125,10 @@ def resolving_step(
     ]
     if any(each.driven.stiff for each in block_records):
         return math.inf
+    refined = functools.cache(Record.refined)  # blocks ask for the same ones
     return min(
         (
-            each.record.step / _needed(each)
+            each.record.step / _needed(each, refined)
             for each in block_records
             if each.floor.width >= _OVER_SAMPLES * each.record.step
         ),
@@ -134,13 +136,13 @@ def resolving_step(
     )
 
 
-def _needed(seen: _BlockRecord) -> int:
+def _needed(seen: _BlockRecord, refined: Callable[[Record, int], Record]) -> int:
     """Return how many samples are needed in the place of one."""
     times = 1
     try:
-        now = _filtered(seen, times)
+        now = _filtered(seen, refined(seen.record, times), times)
         while times < _MOST:
-            finer = _filtered(seen, 2 * times)
+            finer = _filtered(seen, refined(seen.record, 2 * times), 2 * times)
             if float(np.mean(((finer - now) / seen.floor.sigma) ** 2)) <= _RESOLVED:
                 break
             times, now = 2 * times, finer
@@ -149,9 +151,8 @@ def _needed(seen: _BlockRecord) -> int:
     return times
 
 
-def _filtered(seen: _BlockRecord, times: int) -> Array:
-    """Return the filtered output of a block, evaluated at several samples in the place of one."""
-    record = seen.record.refined(times)
+def _filtered(seen: _BlockRecord, record: Record, times: int) -> Array:
+    """Return the filtered output of a block on a record that has several samples in the place of one."""
     output = seen.driven.respond(seen.driven.samples(record, {}), {}).output
     return refined_filter(seen.floor.filter, seen.floor.width / seen.record.step, times) @ output
 
@@ -274,6 +275,11 @@ class Bench:
             clock=self.clock,
             sampling={c.signal: c.sampling for c in self.records.columns if c.sampling},
         )
+
+    def read_otherwise(self, records: RecordSet) -> Bench:
+        """Return the same records, read otherwise between their samples, behind the filters chosen here."""
+        filters = {name: each.filters for name, each in self._as_measured[1].items()}
+        return Bench(records, self._blocks, filters=filters)
 
     def inferred(self, blocks: Sequence[Block], missing: Missing = plain_terms) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.

@@ -26,6 +26,8 @@ import numpy as np
 from scipy.optimize import nnls
 
 from ....foundation.arrays import Array
+from ....foundation.symbolic import remembered
+from ....simulation import Trace
 from ..filters import filter_weights
 from ..records.measurement import Record, RecordSet
 
@@ -418,7 +420,7 @@ def estimate_noise(records: RecordSet, targets: Collection[str] = ()) -> Noise:
     for signal in level.keys() - {*targets, *counted}:
         levels = [min(r.resolution_of(signal).noise, r.noise_beside(signal, counted)) for r in seen]
         level[signal] = max(float(np.median(levels)), quanta[signal] / math.sqrt(12.0))
-    quiet = [(r, *_quiet(r, motions)) for r in seen] if motions else []
+    quiet = [(r, *_quiet(r.trace, tuple(motions.items()))) for r in seen] if motions else []
     for signal in targets:
         if signal not in level or rounded[signal]:
             continue
@@ -446,19 +448,23 @@ def _difference(record: Record, signal: str, rows: slice, lag: int) -> Stretch:
     return Stretch((later - values[rows]) / math.sqrt(2.0), record.step, lag)
 
 
-def _quiet(record: Record, motions: Mapping[str, float]) -> tuple[list[slice], list[tuple[slice, int]]]:
+@remembered(64)  # the same samples are asked again each time that they are read otherwise
+def _quiet(trace: Trace, motions: Sequence[tuple[str, float]]) -> tuple[list[slice], list[tuple[slice, int]]]:
     """Return where all motions rest, and where the record repeats itself after so many samples."""
-    counts = [record.trace[name] / quantum for name, quantum in motions.items()]
+    counts = [trace[name] / quantum for name, quantum in motions]
     # The stretches in which no motion leaves its count by more than one, without their first third. There
     # rubber still creeps, which would be taken for slow noise.
     n = len(counts[0])
     least = max(_LEAST_SAMPLES, n // _MOST_STRETCHES)
     result, first = [], 0
     while first < n - least:
-        behind = min(
-            first + int(np.argmax(np.append(np.abs(each[first:] - each[first]) > _STILL, True)))
-            for each in counts
-        )
+        for end in (first + least, n):  # most stretches are left soon
+            behind = min(
+                first + int(np.argmax(np.append(np.abs(each[first:end] - each[first]) > _STILL, True)))
+                for each in counts
+            )
+            if behind < end:
+                break
         if behind - first >= least:
             result.append(slice(first + (behind - first) // 3, behind))
             first = behind

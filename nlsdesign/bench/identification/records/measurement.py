@@ -130,8 +130,8 @@ def _extent(marks: Array, row: int) -> float:
 
 Role = Literal["fit", "selection", "held_out"]
 
-_derived: WeakKeyDictionary[Trace, dict[tuple[str, Sampling, int, float], Array]] = WeakKeyDictionary()
-"""Derivatives of the signals of a trace, by signal, by how it is read, by order and span."""
+_derived: WeakKeyDictionary[Trace, dict[tuple[str, Sampling, int | str, float], Array]] = WeakKeyDictionary()
+"""Derivatives of the signals of a trace, by signal, by how it is read, by order (or "blur") and span."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +239,11 @@ class Record:
         span
             Time in s over which the rate is taken.
         """
-        return blurred(self.at_samples(signal), self.step, span=span)
+        known, key = _derived.setdefault(self.trace, {}), (signal, self.sampling_of(signal), "blur", span)
+        if key not in known:
+            known[key] = blurred(self.at_samples(signal), self.step, span=span)
+            known[key].flags.writeable = False
+        return known[key]
 
     def as_computed(self, signal: str) -> Array:
         """Return what a prediction of a measured signal must equal at the samples, shape (n,).

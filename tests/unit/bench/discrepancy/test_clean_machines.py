@@ -139,3 +139,29 @@ def test_a_drift_that_imitates_half_a_sample_is_no_name(tmp_path: Path) -> None:
     write_kind_case(tmp_path, "rack_carriage", ("spring_damping",), 1.0, 1198, condition="coarse")
     verdict = diagnose(*opened(tmp_path), catalogue=(effects.spring_damping, effects.clock_drift))
     assert [each.name for each in verdict.effects] == ["spring_damping"]
+
+
+def test_a_wrong_number_that_a_refit_takes_is_mentioned(tmp_path: Path) -> None:
+    """Records of a motor tell inertia over torque constant: a wrong inertia moves both, each by half."""
+    write_kind_case(tmp_path, "direct_drive", (), 0.0, 1286)
+    declared, records = opened(tmp_path)
+    inertia = next(name for name in declared.quantities() if name.endswith(".inertia"))
+    verdicts = {1.0: "none", 1.4: "data_suspect"}
+    for factor, expected in verdicts.items():
+        wrong = declared.with_values({inertia: factor * declared.quantities()[inertia].number})
+        verdict = diagnose(wrong, records, catalogue=())
+        assert verdict.verdict == expected
+        assert (verdict.headline() == "Deck and records contradict each other") == (factor > 1.0)
+        assert any(f"{inertia} 2." in words and "below" in words for words in verdict.findings) == (
+            factor > 1.0
+        )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("hidden", "named"), [("soft_centre", "soft_windup"), ("backlash", "backlash")])
+def test_a_soft_middle_is_no_dead_zone(hidden: str, named: str, tmp_path: Path) -> None:
+    """The bench lacks stiffness as a Gaussian of the motion, the law as one over a squared cosh."""
+    write_kind_case(tmp_path, "belt_axis", (hidden,), 1.0, 1292)
+    rivals = (effects.backlash, effects.soft_windup, effects.strain_stiffening)
+    verdict = diagnose(*opened(tmp_path), catalogue=rivals)
+    assert [each.name for each in verdict.effects] == [named]

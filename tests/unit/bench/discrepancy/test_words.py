@@ -416,7 +416,7 @@ def test_a_reason_that_asks_ends_with_its_question_mark() -> None:
 def test_strained_numbers_are_called_by_their_names() -> None:
     before = Excess(DECLARED, "1", 1.0, 2.3, 2.3, 16.0, 3, 3.0, open=True)
     fit = SimpleNamespace(prior_z_scores=lambda: {"arm.mass": 3.46, "gear.loss": -2.1, "arm.inertia": 0.3})
-    said = _strained(before, before, cast(Hypothesis, SimpleNamespace(fits={"motor": fit})))
+    (said,) = _strained(before, before, cast(Hypothesis, SimpleNamespace(fits={"motor": fit})))
     assert said.endswith("away before, 2.3 after: arm.mass 3.5 above, gear.loss 2.1 below")
 
 
