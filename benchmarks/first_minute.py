@@ -3,6 +3,7 @@
 Writes the tables of ``docs/install.md`` anew. Times of commands are of the processor, the median of several
 calls, beside that of an interpreter that loads nothing. ``--install`` also makes an environment of its own,
 installs the checkout without extras and with ``[export]``, and weighs both; it needs a package index.
+``--study`` clones what is committed and runs ``make study`` there from nothing, then ``--fast`` once more.
 """
 
 from __future__ import annotations
@@ -61,6 +62,36 @@ def installed(*words: str) -> str:
     return f"| `pip install {' '.join(words)}` | {seconds:.0f} | {size / 1e6:.0f} |"
 
 
+def studied() -> list[str]:
+    """Return the rows of ``make study`` in a new clone: clock until each report stands, and processor."""
+    rows = ["| command | first report, s | whole, s | processor, s | processes waiting |"]
+    rows.append("| --- | ---: | ---: | ---: | ---: |")
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(["git", "clone", "--quiet", ROOT, folder], check=True)
+        fast = [".venv/bin/nlsdesign", "study", "run", "austin2015", "--fast", "--out", "out/fast"]
+        for name, words, first in (
+            ("make study", ["make", "study"], "out/hello/report.html"),
+            ("nlsdesign study run austin2015 --fast", fast, "out/fast/report.html"),
+        ):
+            begun, before = time.perf_counter(), os.times()
+            running = subprocess.Popen(words, cwd=folder, stdout=subprocess.DEVNULL)
+            seen, waiting = 0.0, []
+            while running.poll() is None:
+                time.sleep(0.5)
+                waiting.append(os.getloadavg()[0])
+                if not seen and Path(folder, first).exists():
+                    seen = time.perf_counter() - begun
+            whole, after = time.perf_counter() - begun, os.times()
+            if running.returncode:
+                raise subprocess.CalledProcessError(running.returncode, words)
+            spent = (
+                after.children_user + after.children_system - before.children_user - before.children_system
+            )
+            load = statistics.mean(waiting)
+            rows.append(f"| `{name}` | {seen or whole:.0f} | {whole:.0f} | {spent:.0f} | {load:.1f} |")
+    return rows
+
+
 def _size(folder: Path) -> int:
     return sum(path.lstat().st_size for path in folder.rglob("*") if path.is_file())
 
@@ -70,8 +101,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.first_minute", description=__doc__)
     parser.add_argument("--calls", type=int, default=5, help="of each command")
     parser.add_argument("--install", action="store_true", help="install into new environments too")
+    parser.add_argument("--study", action="store_true", help="run make study in a new clone too")
     given = parser.parse_args()
     tables = {"start-up": start_up(given.calls)}
+    if given.study:
+        tables["study"] = studied()
     if given.install:
         rows = ["| installation | clock, s | disk without pip itself, MB |", "| --- | ---: | ---: |"]
         tables["sizes"] = [

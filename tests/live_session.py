@@ -138,9 +138,9 @@ class Session:
         assert "refused" not in answer, answer
         return answer["name"], base64.b64decode(answer["content"])
 
-    def open(self, content: bytes) -> str:
-        """Open a deck or a saved design; return why it was refused, or nothing."""
-        answer = self.server(what="open", content=base64.b64encode(content).decode())
+    def open(self, content: bytes, **fields: str) -> str:
+        """Hand over a deck, a saved design, a task or coils; return why it was refused, or nothing."""
+        answer = self.server(what="open", content=base64.b64encode(content).decode(), **fields)
         return str(answer.get("refused", ""))
 
 

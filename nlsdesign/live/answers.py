@@ -89,7 +89,8 @@ class LiveControls:
     numbers: tuple[Any, ...]
     contour: str  # name of the contour
     contour_free: bool  # whether it may change
-    tasks: tuple[Any, ...]  # rows (joint, body mass, part of the torque, share of the time)
+    tasks: tuple[Any, ...]  # rows (joint, body mass, part of the torque, share of the time, kind)
+    stock: tuple[str, ...]  # what of the spring can be bought: "rubber", "coil"
     motor: Mapping[str, float]  # numbers of the motor that were given
     # can_undo, can_redo: whether there is a step back or forth
     can_undo: bool
@@ -162,6 +163,10 @@ class Mechanism:
     contacts: tuple[Array, ...]
     guides: tuple[Array, ...]
     rubbers: tuple[Array, ...]  # corners of each piece of rubber (stretched to scale), shape (4, 2)
+    edges: tuple[Array, ...]  # closed edges of the part as it is cut; empty before the check
+    holes: tuple[tuple[float, float, float], ...]  # centre and radius of each hole of the part
+    # dimensions: rows (words, one end x, y, other end x, y, size), each parallel to an axis
+    dimensions: tuple[tuple[str, float, float, float, float, float], ...]
     extent: tuple[float, float]  # half the width and height of a frame that holds the mechanism at any angle
     remark: str  # what is not to scale
 

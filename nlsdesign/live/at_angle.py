@@ -10,6 +10,7 @@ import numpy as np
 
 from ..components.assembly.named_parts import Assembly
 from ..design import Contour
+from ..design.drawing.making import Mounting, carrying_note
 from ..design.statics.contour import cable_up_to, turn
 from ..feedback.analysis import Observability
 from ..feedback.analysis.rest_points import RestPoints, rest_points
@@ -62,6 +63,7 @@ def mechanism_at(
     # Of one lip the sector between it and the centre is drawn.
     lip = np.vstack([[0.0, 0.0], contour.points, [0.0, 0.0]])
     outlines = contour.outlines(angle) if both else (turn(lip, angle),)
+    low, beside = radius + _THICKNESS, float(end[1]) - _THICKNESS
     short = "; the rubber is drawn shorter than it is" if shown < rest_length + extensions[0] else ""
     return Mechanism(
         angle=angle,
@@ -70,11 +72,38 @@ def mechanism_at(
         contacts=tuple(side * contact for side in sides),
         guides=tuple(side * end for side in sides),
         rubbers=tuple(side * corners for side in sides),
-        extent=(wall + 2e-3, radius + _THICKNESS),
+        edges=(),
+        holes=(),
+        dimensions=(
+            ("cam radius", -radius, -low, 0.0, -low, radius),
+            *((("to the guide", 0.0, -low, guide, -low, guide),) if guide == contour.anchor_distance else ()),
+            ("rubber", float(clamp[0]), beside, wall, beside, rest_length + extensions[1]),
+        ),
+        extent=(wall + 2e-3, radius + 1.6 * _THICKNESS),
         remark="extension, cam and cable are to scale, the height of the rubber is not" + short,
     )
 
 
+def with_part(drawn: Mechanism, mounting: Mounting) -> Mechanism:
+    """Return a mechanism with the edges, holes and sizes of its part, turned with the cam."""
+    part = mounting.part
+    names = {"thickness": "plate", "body_radius": "body radius", "bolt_circle": "bolt circle"}
+    sizes = [f"{words} {1e3 * part.number(n):.3g} mm" for n, words in names.items() if n in part.numbers]
+    carried = carrying_note(part, mounting.torque)
+    return replace(
+        drawn,
+        edges=tuple(turn(outline.polygon(_CHORD), drawn.angle) for outline in part.outlines),
+        holes=tuple(
+            (float(x), float(y), hole.diameter / 2.0)
+            for hole in part.holes
+            for x, y in turn(hole.centre[None, :], drawn.angle)
+        ),
+        remark=f"{drawn.remark}. The part: {', '.join(sizes)}. {carried}",
+    )
+
+
+_CHORD = 2e-5
+"""Distance in m by which a drawn edge may cut the corner of its arcs."""
 _GRID = 21
 """Angles over which the typical sizes of states are taken, as observability is scaled by them."""
 _LOOP_ANGLES = 41
@@ -90,6 +119,7 @@ class AngleView:
     contour: Contour  # of its cam
     cam: CamNames  # names around it
     make: Callable[[], Assembly]  # gives the changed assembly; asked when it is first needed
+    mounting: Mounting | None = None  # the part as it is made, once it is checked
 
     @cached_property
     def machine(self) -> Assembly:
@@ -129,7 +159,8 @@ class AngleView:
         column = self.view.column("extension").values
         now = float(np.interp(abs(angle), self.view.columns[0].values, column))
         extensions = (float(column[0]), now, float(column[-1]))
-        return mechanism_at(self.contour, angle, extensions=extensions, rest_length=self.rest_length)
+        drawn = mechanism_at(self.contour, angle, extensions=extensions, rest_length=self.rest_length)
+        return drawn if self.mounting is None else with_part(drawn, self.mounting)
 
     def answer(self, angle: float, loop: Lazy) -> AngleAnswer:
         """Return what holds at one angle besides the mechanism."""

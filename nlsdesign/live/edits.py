@@ -9,14 +9,17 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 from ..components.assembly.library_rubber import with_rubber
+from ..components.assembly.named_parts import Assembly
+from ..design import RubberStock
 from ..design.optimisation.limits import limit_kinds
+from ..design.optimisation.stock import StockChoice, combinations
 from ..design.parametric.cam_question import TargetPoint
 from ..foundation import rubber_library as library
 from ..foundation.errors import ArrangementError, ValueRangeError, brief, unknown_name
 from .at_angle import AngleView
 from .gallery import gallery_question
 from .question import LARGEST_ANGLE, LARGEST_TORQUE, LEAST_STEP, LiveQuestion, finite_in
-from .tasks import drop_task, follow_tasks, set_motor, set_task
+from .tasks import drop_task, follow_tasks, set_motor, set_task, take_gear_ratio
 from .views import in_words
 
 _LONGEST_NAME = 200
@@ -187,12 +190,31 @@ def choose_material(question: LiveQuestion, _: AngleView | None, material: str) 
     changed = question.machine.assembly
     for piece in pieces:
         changed = with_rubber(changed, library.material(material), piece=piece.name)
+    return _of(question, changed, material, set())
+
+
+def take_from_stock(
+    question: LiveQuestion, _: AngleView | None, choices: tuple[StockChoice, ...], row: int
+) -> LiveQuestion:
+    """Take one combination of a stock, counted from 0; what was chosen from it is held."""
+    options = combinations(question.actuator, choices)
+    if not 0 <= row < len(options):
+        raise ValueRangeError(f"row {row + 1} of the stock", f"is not there; there are {len(options)}")
+    rubbers = [each for each in choices if isinstance(each, RubberStock)]
+    material = question.machine.material
+    if rubbers:  # stands first among the choices
+        material = rubbers[0].materials[row * len(rubbers[0].materials) // len(options)]
+    return _of(replace(question, given={}), options[row][1], material, {each.chosen for each in choices})
+
+
+def _of(question: LiveQuestion, changed: Assembly, material: str, held: set[str]) -> LiveQuestion:
+    """Return a question about another machine, without the numbers that it has not; ``held``: not free."""
     machine = replace(question.machine, assembly=changed, material=material)
     names = {*machine.sizes, question.contour}
     return replace(
         question,
         machine=machine,
-        free=tuple(number for number in question.free if number in names),
+        free=tuple(number for number in question.free if number in names - held),
         ranges={number: ends for number, ends in question.ranges.items() if number in names},
         given={number: value for number, value in question.given.items() if number in names},
     )
@@ -232,6 +254,7 @@ EDITS: Mapping[str, Callable[..., LiveQuestion]] = {
     "DropTask": drop_task,
     "SetMotor": set_motor,
     "FollowTasks": follow_tasks,
+    "TakeGearRatio": take_gear_ratio,
 }
 """What each edit does, by the name that messages of the page give it."""
 

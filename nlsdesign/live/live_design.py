@@ -89,7 +89,9 @@ def settled_moment(solver: ParametricSolver, moment: LiveMoment, full: FullDesig
         return replace(moment, answer=answer)
     shown, finished = moment.shown, full.design
     if answer.design:
-        shown = AngleView(answer.design, finished.contour, question.cam, lambda: finished.actuator)
+        shown = AngleView(
+            answer.design, finished.contour, question.cam, lambda: finished.actuator, full.mounting
+        )
     solved = solver.beside_design(question, full.design)
     numbers = moment.numbers if solved is None else solved.numbers
     return LiveMoment(question, answer, solved or moment.solved, numbers, shown)

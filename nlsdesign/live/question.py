@@ -30,13 +30,32 @@ _READ_IN = {
 """Units of the page and their factors, by unit in SI; "%" stands for a ratio that is read so."""
 
 
-class AskedTask(NamedTuple):
-    """What the actuator has to do for a part of the time: walking, at one joint."""
+class TaskRecord(NamedTuple):
+    """A motion of one's own at equal times of one period."""
 
-    joint: str
+    period: float  # in s
+    per_mass: bool  # whether the torque is in N·m per kg of body mass
+    # angles, torques: in rad and N·m
+    angles: tuple[float, ...]
+    torques: tuple[float, ...]
+
+
+class AskedTask(NamedTuple):
+    """What the actuator has to do for a part of the time: walking at one joint, or a record of one's own."""
+
+    joint: str  # or the name of the file
     body_mass: float  # in kg
     scale: float  # part of the torque of the joint that the actuator gives
     share: float  # of the time, beside the shares of the other tasks
+    record: TaskRecord | None = None  # None for walking
+
+    @property
+    def row(self) -> tuple[str | float, ...]:
+        """What the page shows of it: the numbers, and whether it is walking, one's own, or that per mass."""
+        kind = "walking"
+        if self.record is not None:
+            kind = "per mass" if self.record.per_mass else "own"
+        return (*self[:4], kind)
 
 
 @dataclass(frozen=True, eq=False)

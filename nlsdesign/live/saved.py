@@ -66,7 +66,7 @@ def saved(question: LiveQuestion, values: dict[str, float]) -> SavedDesign:
         f"title = {json.dumps(question.title)}",
         f"material = {json.dumps(question.machine.material)}",
         f"points = {json.dumps([[float(v) for v in point] for point in question.points])}",
-        f"tasks = {json.dumps(question.tasks)}",
+        f"tasks = {json.dumps([row if row[4] else row[:4] for row in question.tasks])}",
         "",
         "[values]",
         *(f"{json.dumps(name)} = {float(value)!r}" for name, value in values.items()),

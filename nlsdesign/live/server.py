@@ -136,7 +136,7 @@ class _Answers:
         return await self._answer(request, self._keep)
 
     async def open(self, request: Request) -> Response:
-        """Hand a deck, or a design that was saved, to the session."""
+        """Hand a deck, a design that was saved, a task or a list of coils to the session."""
         return await self._answer(request, self._open)
 
     async def file(self, request: Request) -> Response:
@@ -178,7 +178,8 @@ class _Answers:
             if len(content) > DECK_BYTES:
                 raise too_large("deck", DECK_BYTES)
         sent = base64.b64encode(content).decode()
-        answer = await session.process.ask({"what": "open", "content": sent})
+        asked = {key: request.query_params.get(key, "") for key in ("kind", "name")}
+        answer = await session.process.ask({"what": "open", "content": sent, **asked})
         if "refused" in answer:
             raise NlsError("not opened", str(answer["refused"]))
         return JSONResponse({"opened": True})

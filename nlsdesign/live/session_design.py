@@ -9,17 +9,22 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
+from ..components.materials.material_law import missing_law
+from ..design import CoilStock, RubberStock, Stock
+from ..design.optimisation.stock import StockChoice
 from ..foundation.errors import NlsError, ValueRangeError, brief, unknown_name
+from ..foundation.rubber_library import materials
 from .answers import WorkStage
 from .background import warm_up
-from .edits import edit_from
+from .edits import edit, edit_from, take_from_stock
 from .gallery import gallery_question, question_of_deck
 from .live_design import LiveDesign, open_question
 from .messages import Inbox, Outbox
-from .question import LiveQuestion
+from .question import LiveQuestion, finite_in
 from .saved import archived, reopened, unarchived
 from .session_news import TASKS, SessionNews, choices
 from .sessions import plain_letters
+from .tasks import add_record, record_of
 from .views import in_words
 from .work import Work
 
@@ -36,7 +41,7 @@ class PageQuestions:
         self._news = news
         self._kinds: Mapping[str, Callable[[Asked], None]] = {
             "show": self._show, "edit": self._edit, "angle": self._turn, "step": self._step,
-            "keep": self._keep, "work": self._work,
+            "keep": self._keep, "work": self._work, "stock": self._stock,
         }  # fmt: skip
 
     def answer(self, asked: Asked) -> None:
@@ -85,6 +90,21 @@ class PageQuestions:
             raise unknown_name("kept design", name[:80], live.snapshots)
         self._news.kept(_number(asked))
 
+    def _stock(self, asked: Asked) -> None:
+        """Try what can be bought, or take one row of what was tried."""
+        row, angle, news = asked.get("take"), _angle(asked), self._news
+        if row is None:
+            news.stock = stock_of(asked, news.live.question)
+            news.work.start(Work.STOCK, news.stock)
+            news.work_of(Work.STOCK, _number(asked))
+            return
+        if isinstance(row, bool) or not isinstance(row, int) or not news.stock:
+            raise ValueRangeError(
+                f"row {brief(row)} of the stock", "was not tried", next_step="try the stock first"
+            )
+        news.answer(news.live.apply(edit(take_from_stock, news.stock, row)), _number(asked), angle)
+        news.settle_soon()
+
     def _work(self, asked: Asked) -> None:
         name = str(asked.get("name", ""))
         if name not in TASKS:
@@ -94,6 +114,29 @@ class PageQuestions:
         else:
             self._news.work.start(name)
         self._news.work_of(name, _number(asked))
+
+
+def stock_of(asked: Asked, question: LiveQuestion) -> tuple[StockChoice, ...]:
+    """Return what a page offers to choose from: all rubbers with a law, values of one size in SI."""
+    choices: list[StockChoice] = []
+    if asked.get("rubbers") is True:
+        choices.append(RubberStock(tuple(n for n, each in materials().items() if not missing_law(each))))
+    name, values = str(asked.get("size") or ""), asked.get("values")
+    if name:
+        size = question.number(name)
+        given = values if isinstance(values, list) else []
+        choices.append(
+            Stock(
+                name,
+                tuple(
+                    finite_in(name, each, lowest=size.minimum, highest=size.maximum, unit=size.unit)
+                    for each in given
+                ),
+            )
+        )
+    if not choices:
+        raise ValueRangeError("stock", "is empty", next_step="offer the rubbers, or values of a size")
+    return tuple(choices)
 
 
 def _number(asked: Asked) -> int | None:
@@ -176,7 +219,19 @@ class SessionDesign:
         if asked["what"] == "open":
             # Go on from a saved design or a deck, one step that can be undone. What is open stays as it is
             # where the file cannot be read.
-            content = base64.b64decode(asked["content"])
+            content, name = base64.b64decode(asked["content"]), plain_letters(str(asked.get("name", "")))
+            live = self._news.live
+            if asked.get("kind") == "task":
+                self._news.answer(live.apply(edit(add_record, name, record_of(content, name))), None, None)
+                self._news.settle_soon()
+                return {}
+            if asked.get("kind") == "coils":
+                self._records.parent.mkdir(parents=True, exist_ok=True)
+                (self._records.parent / name).write_bytes(content)
+                self._news.stock = (CoilStock(self._records.parent / name),)
+                self._news.work.start(Work.STOCK, self._news.stock)
+                self._news.work_of(Work.STOCK, None)
+                return {}
             values: dict[str, float] = {}
             if content.startswith(b"PK"):
                 question, values = reopened(unarchived(content))

@@ -14,6 +14,7 @@ import numpy as np
 from ..components.materials.material_law import missing_law
 from ..design.curves.task import walking_tables
 from ..design.optimisation.limits import limit_kinds
+from ..design.optimisation.stock import StockChoice
 from ..foundation.arrays import Array
 from ..foundation.errors import NlsError
 from ..foundation.rubber_library import materials
@@ -61,10 +62,13 @@ def mechanism_data(shown: AngleView | None, angle: float | None) -> dict[str, An
         return {"angle": angle, "mechanism": None, "reason": in_words(str(error))}
     lines = {
         name: [short_numbers(_fewer(each)) for each in getattr(mechanism, name)]
-        for name in ("halves", "cables", "contacts", "guides", "rubbers")
+        for name in ("halves", "cables", "contacts", "guides", "rubbers", "edges")
     }
     extent = short_numbers(np.array(mechanism.extent))
-    picture = {"angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark}
+    picture = {
+        "angle": mechanism.angle, **lines, "extent": extent, "remark": mechanism.remark,
+        "holes": mechanism.holes, "dimensions": mechanism.dimensions,
+    }  # fmt: skip
     return {"angle": angle, "mechanism": picture, "reason": ""}
 
 
@@ -92,7 +96,7 @@ def _fewer(points: Array) -> Array:
     return fewer
 
 
-TASKS: Final = (Work.SETTLE, Work.TOLERANCE, Work.LOOP, Work.DIAGNOSIS)
+TASKS: Final = (Work.SETTLE, Work.TOLERANCE, Work.LOOP, Work.DIAGNOSIS, Work.STOCK)
 """The kinds of work that a page may ask for."""
 _MOST_STAGES = 60
 
@@ -116,12 +120,12 @@ class WorkNews:
         """Whether any work runs."""
         return any(each.state is WorkStage.COMPUTING for each in self._live.work.states())
 
-    def start(self, name: str) -> None:
-        """Start work of a kind."""
-        diagnosis = name == Work.DIAGNOSIS
-        if diagnosis:
+    def start(self, name: str, *settings: object) -> None:
+        """Start work of a kind; a diagnosis takes the records, a stock what is offered."""
+        if name == Work.DIAGNOSIS:
             self._records.mkdir(parents=True, exist_ok=True)
-        state = self._live.start(Work(name), *([self._records] if diagnosis else []))
+            settings = (self._records,)
+        state = self._live.start(Work(name), *settings)
         self._stages[name] = []
         self._began_with[name] = self._basis(name)
         self._noted(state)
@@ -186,6 +190,8 @@ class WorkNews:
         if name == Work.DIAGNOSIS:
             # Points and limits belong to the design, not to the machine.
             return (_listed(self._records), live.question.machine, dict(live.question.given))
+        if name == Work.STOCK:
+            return (live.answer.revision,)
         design = live.answer.design
         return live.answer.revision, design is not None and design.checked
 
@@ -224,6 +230,7 @@ class SessionNews:
         self._angle: float | None = None
         self._settle_at: float | None = None
         self._look_due = False
+        self.stock: tuple[StockChoice, ...] = ()  # what was tried last
         self._paid: tuple[object, ...] = ()  # question and design of which the page knows what the motor pays
 
     @property

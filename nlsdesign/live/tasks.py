@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+import tempfile
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from ..components import Gear
 from ..design import (
     MixedTask,
     MotorAndGear,
@@ -24,13 +28,14 @@ from ..design import (
     walking_task,
 )
 from ..design.curves.numbers import plain
+from ..design.curves.task import Task, read_task
 from ..design.parametric.cam_question import TargetPoint
 from ..foundation.arrays import Array
-from ..foundation.errors import InfeasibleError, NlsError, ValueRangeError, unknown_name
+from ..foundation.errors import ArrangementError, InfeasibleError, NlsError, ValueRangeError, unknown_name
 from ..model.roles import driven_body
 from .answers import DesignView
 from .at_angle import AngleView
-from .question import AskedTask, LiveQuestion, finite_in
+from .question import AskedTask, LiveQuestion, TaskRecord, finite_in
 from .views import in_words
 
 MOST_TASKS = 4
@@ -40,6 +45,11 @@ _BEYOND = 0.02
 """Share of its last angle by which a spring is taken to go on as it ends, for tasks that end just there."""
 _MOST_ROWS = 60
 """Rows of the table in which a designed spring is held against tasks."""
+_RECORD, _MOST_RECORD = 200, 2000
+"""Times of one period at which a record of one's own is kept, and most of them that are reopened."""
+_USUAL_MASS = 75.0
+"""Assumed: body mass in kg of a record whose torque is per mass, until another is given."""
+_TAKEN = "gear ratio {:g}:1, taken over from the live page"
 _MOTOR = {"resistance": (1e-6, 1e6, "Ohm"), "gear_ratio": (1e-3, 1e4, "1")}
 """Numbers of the motor that a designer may give: their range and unit."""
 
@@ -50,8 +60,8 @@ def set_task(
 ) -> LiveQuestion:  # fmt: skip
     """Set a task, counted from 0; one after the last is added.
 
-    ``body_mass``: in kg; ``scale``: part of the torque of the joint that the actuator gives, for ``None`` as
-    much as the target has; ``share``: of the time.
+    ``joint``: or the name of a record that is there; ``body_mass``: in kg; ``scale``: part of the torque of
+    the joint that the actuator gives, for ``None`` as much as the target has; ``share``: of the time.
     """
     if not 0 <= index <= min(len(question.tasks), MOST_TASKS - 1):
         raise ValueRangeError(
@@ -59,17 +69,52 @@ def set_task(
             next_step="change one that is there",
         )  # fmt: skip
     mass = finite_in("body mass in kg", body_mass, lowest=1.0, highest=500.0)
-    whole = float(np.max(np.abs(walking_task(joint, body_mass=mass).sampled().torque)))
+    known = {each.joint: each.record for each in question.tasks}
+    asked = AskedTask(joint, mass, 1.0, 1.0, known.get(joint))
+    whole = float(np.max(np.abs(_task(asked).sampled().torque)))
     wanted = float(f"{question.target_size / whole:.2g}") if scale is None else scale
-    asked = AskedTask(
-        joint,
-        mass,
-        finite_in("assistance", wanted, lowest=1e-6, highest=100.0, unit="%"),
-        finite_in("share of the time", share, lowest=0.05, highest=1.0, unit="%"),
+    asked = asked._replace(
+        scale=finite_in("assistance", wanted, lowest=1e-6, highest=100.0, unit="%"),
+        share=finite_in("share of the time", share, lowest=0.05, highest=1.0, unit="%"),
     )
     tasks = list(question.tasks)
     tasks[index : index + 1] = [asked]
     return replace(question, tasks=tuple(tasks))
+
+
+def add_record(question: LiveQuestion, _: AngleView | None, name: str, record: TaskRecord) -> LiveQuestion:
+    """Add a task of one's own with the whole of its torque; ``name``: of the file."""
+    if len(question.tasks) >= MOST_TASKS:
+        raise ValueRangeError(f"task '{name}'", f"is one more than {MOST_TASKS}", next_step="drop one first")
+    own = AskedTask(name, _USUAL_MASS if record.per_mass else 1.0, 1.0, 1.0, record)
+    return replace(question, tasks=(*question.tasks, own))
+
+
+def record_of(content: bytes, name: str) -> TaskRecord:
+    """Return the record of a file with the columns time, angle and torque, of one period.
+
+    ``name``: of the file, without a path.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / name
+        file.write_bytes(content)
+        try:
+            task, per_mass = read_task(file), False
+        except ValueRangeError:
+            task, per_mass = read_task(file, body_mass=1.0), True
+    cycle = task.sampled(_RECORD)
+    angles, torques = (tuple(float(f"{v:.7g}") for v in row) for row in (cycle.angle, cycle.torque))
+    return TaskRecord(cycle.period, per_mass, angles, torques)
+
+
+def _task(asked: AskedTask) -> Task:
+    """Return what a task asks for, with the whole of its torque."""
+    record, mass = asked.record, asked.body_mass
+    if record is None:
+        return walking_task(asked.joint, body_mass=mass)
+    time = np.arange(len(record.angles)) * record.period / len(record.angles)
+    torque = np.array(record.torques) * (mass if record.per_mass else 1.0)
+    return Task(time=time, angle=record.angles, torque=torque, period=record.period)
 
 
 def drop_task(question: LiveQuestion, _: AngleView | None, index: int) -> LiveQuestion:
@@ -95,6 +140,35 @@ def set_motor(
     )
 
 
+def take_gear_ratio(question: LiveQuestion, _: AngleView | None) -> LiveQuestion:
+    """Put the gear ratio that is tried into the machine.
+
+    The inertia of a motor that is declared behind its gear follows with the square of the ratio; friction and
+    what else is declared there stays.
+    """
+    if "gear_ratio" not in question.motor:
+        raise ValueRangeError("gear ratio", "none is tried", next_step="give one to try first")
+    wanted, model = question.motor["gear_ratio"], question.machine.model
+    now, motor = plain(_drive(replace(question, motor={})).gear_ratio), driven_body(model).motor
+    known, factor = question.machine.assembly.quantities(), wanted / now
+    gears = [f"{path}.ratio" for path, part in question.machine.assembly.walk() if isinstance(part, Gear)]
+    changes = {name: factor for name in gears if abs(known[name].number) != 1.0}
+    if motor is not None and motor.gear_ratio is not None:
+        changes = {motor.gear_ratio: factor, motor.inertia: factor**2}
+    changed = {n: known[n].with_value(known[n].number * f, _TAKEN.format(wanted)) for n, f in changes.items()}
+    machine = replace(question.machine, assembly=question.machine.assembly.with_values(changed))
+    taken = replace(
+        question, machine=machine, motor={k: v for k, v in question.motor.items() if k != "gear_ratio"}
+    )
+    if not math.isclose(plain(_drive(taken).gear_ratio), wanted, rel_tol=1e-6):
+        raise ArrangementError(
+            "gear ratio",
+            f"is that of {len(changes)} gears together",
+            next_step="change one of them in the deck",
+        )
+    return taken
+
+
 def follow_tasks(question: LiveQuestion, _: AngleView | None) -> LiveQuestion:
     """Take the curve of least motor heat over the tasks as the target, at round angles."""
     curve = curve_of(question).target
@@ -110,12 +184,29 @@ def follow_tasks(question: LiveQuestion, _: AngleView | None) -> LiveQuestion:
 def reopened_tasks(question: LiveQuestion, rows: object, motor: object) -> LiveQuestion:
     """Return a question with the tasks and numbers of the motor of a saved design, checked."""
     for index, row in enumerate(rows if isinstance(rows, list) else ()):
-        if not (isinstance(row, list) and len(row) == len(AskedTask._fields) and isinstance(row[0], str)):
+        if not (isinstance(row, list) and len(row) in (4, 5) and isinstance(row[0], str)):
             raise ValueRangeError(f"live.toml: task {index + 1}", "is no row of joint and three numbers")
-        question = set_task(question, None, index, *row)
+        for each in row[4:]:
+            question = add_record(question, None, row[0], _reopened_record(each))
+        question = set_task(question, None, index, *row[:4])
     for name, value in motor.items() if isinstance(motor, dict) else ():
         question = set_motor(question, None, str(name), value)
     return question
+
+
+def _reopened_record(row: object) -> TaskRecord:
+    given: Any = row
+    try:
+        period, per_mass, *columns = given
+        angles, torques = (tuple(float(v) for v in column) for column in columns)
+        if len(angles) <= _MOST_RECORD:
+            return TaskRecord(float(period), per_mass is True, angles, torques)
+    except (TypeError, ValueError):
+        pass
+    raise ValueRangeError(
+        "live.toml: a task of your own", f"is no period with at most {_MOST_RECORD} angles and torques",
+        next_step="save the design again",
+    )  # fmt: skip
 
 
 def curve_of(question: LiveQuestion) -> TaskCurve:
@@ -138,9 +229,7 @@ def least_heat(tasks: tuple[AskedTask, ...], drive: MotorAndGear, one_sided: boo
 
 
 def _mixed(tasks: Iterable[AskedTask]) -> MixedTask:
-    return MixedTask(
-        tuple((walking_task(t.joint, body_mass=t.body_mass).scaled(t.scale), t.share) for t in tasks)
-    )
+    return MixedTask(tuple((_task(asked).scaled(asked.scale), asked.share) for asked in tasks))
 
 
 def _drive(question: LiveQuestion) -> MotorAndGear:

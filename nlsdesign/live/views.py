@@ -120,6 +120,7 @@ _MOST_CHECKED = 161
 
 def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> LiveControls:
     """Return what a designer can move."""
+    behind = {"rubber": question.cam.specimens, "coil": question.cam.coils}
     limits = tuple(
         (name, each.kind.words, each.value, each.kind.unit, each.kind.shown_unit, each.kind.upper,
          each.by_default)
@@ -133,7 +134,8 @@ def controls_of(question: LiveQuestion, *, can_undo: bool, can_redo: bool) -> Li
         numbers=tuple(tuple(each) for each in question.numbers.values()),
         contour=question.contour,
         contour_free=question.contour in question.free,
-        tasks=tuple(tuple(each) for each in question.tasks),
+        tasks=tuple(each.row for each in question.tasks),
+        stock=tuple(kind for kind, there in behind.items() if there),
         motor=question.motor,
         can_undo=can_undo,
         can_redo=can_redo,

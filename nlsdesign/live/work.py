@@ -1,7 +1,4 @@
-"""Long work on a design: whole design, tolerance cloud, torque loop, diagnosis, files; each in a process.
-
-Whether a checked design can be made, will hold, and its torque can be known: yes, no, or unknown.
-"""
+"""Long work on a design: whole design, tolerance cloud, torque loop, diagnosis, stock, files."""
 
 from __future__ import annotations
 
@@ -13,7 +10,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,19 +27,16 @@ from ..design import (
     tolerance_analysis,
     write_drawings,
 )
-from ..design.drawing.making import process_of
+from ..design.drawing.making import Mounting
 from ..design.jobs.written_design import declared_edge
-from ..design.optimisation.defaults import strain_ends
-from ..design.optimisation.limits import limit_kinds
+from ..design.optimisation.stock import StockChoice, combinations
 from ..design.parametric.parametric_solver import ParametricDesign
-from ..feedback.observer import least_torque_error, observer_bench
 from ..foundation.arrays import Array
-from ..foundation.errors import ConvergenceError, InfeasibleError, NlsError, ValueRangeError, unknown_name
+from ..foundation.errors import ConvergenceError, InfeasibleError, ValueRangeError, unknown_name
 from ..foundation.written_numbers import prefixed
-from ..model import FlatModel, flatten
+from ..model import flatten
 from ..model.roles import measured_motion, series_cam, series_spring
 from ..model.transform import with_outputs
-from ..simulation import declared_prior
 from .answers import (
     AnswerSource,
     AnswerState,
@@ -54,100 +48,12 @@ from .answers import (
 )
 from .at_angle import AngleView, loop_responses
 from .background import BackgroundWork, WorkState
+from .lights import Light, lights_of, mounting_of
 from .question import LiveQuestion
 from .views import in_words, not_kept, unkept, view_of
 
 Stage = Callable[[str], None]
 """Told in words what is done now."""
-
-_LARGEST_ERROR = 0.05
-"""Assumed: part of the largest torque by which a made spring may err, and its torque may be unknown, rms."""
-_BROKEN = 5e-4
-_STRENGTHS = {
-    "rubber": {"MaximumStrain", "MaximumStress"},
-    "cable": {"MaximumCableTension"},
-    "coil": {"GoodmanSafety"},
-}
-"""Limits of which one at least must hold of what a spring is made of, or nobody knows whether it holds."""
-YES, NO, UNKNOWN = "yes", "no", "unknown"
-
-
-class Light(NamedTuple):
-    """One question that decides whether a design is worth building."""
-
-    asked: str  # "can be made", "will hold" or "will be known"
-    answer: str  # "yes", "no" or "unknown"
-    words: str  # by what
-
-
-def lights_of(design: CamDesign, keep: tuple[Limit, ...]) -> tuple[Light, ...]:
-    """Return the three lights of a finished design.
-
-    ``keep``: all limits that held.
-    """
-    model = flatten(design.actuator)
-    return (
-        Light("can be made", *can_be_made(design, model)),
-        Light("will hold", *will_hold(design, model, {type(each).__name__ for each in keep})),
-        Light("will be known", *will_be_known(model, design.target.largest)),
-    )
-
-
-def can_be_made(design: CamDesign, model: FlatModel) -> tuple[str, str]:
-    """Return whether the edge can be cut and made springs are alike enough: answer and reason."""
-    largest, made = design.target.largest, design.tolerance
-    if not design.met:
-        return NO, f"even with exact numbers the torque errs by {prefixed(design.rms)} rms"
-    kind, radius = declared_edge(design.actuator, series_cam(model))
-    if radius is None:
-        return UNKNOWN, "the deck declares no cable, so that there is no edge to cut"
-    try:
-        part = kind(**{"cable_radius": radius}).part(design.contour)  # type: ignore[arg-type]
-    except NlsError as error:
-        return NO, str(error)
-    if made is None or not made.causes:
-        return UNKNOWN, "the deck declares no spread, so that nobody knows how made springs differ"
-    built, trim = made.quantiles[-1].value, made.trims[0] if made.trims else None
-    words = f"95 % of made springs err by less than {prefixed(built)} rms"
-    if trim is not None and built > _LARGEST_ERROR * largest:
-        words += f", {prefixed(trim.quantiles[-1].value)} once {trim.name} is set on the bench"
-        built = trim.quantiles[-1].value
-    if built > _LARGEST_ERROR * largest:
-        return (
-            NO,
-            f"{words}; {prefixed(_LARGEST_ERROR * largest)} would do: tighten {made.tighten_first}",
-        )
-    return YES, f"{words}; {process_of(part)}"
-
-
-def will_hold(design: CamDesign, model: FlatModel, kept: set[str]) -> tuple[str, str]:
-    """Return whether limits and what is stated of the rubber hold: answer and reason."""
-    strengths = [each for each in design.limits if each.limit in limit_kinds()]
-    for each in strengths:
-        past = (each.value - each.bound) * (1.0 if each.upper else -1.0)
-        if past > _BROKEN * abs(each.bound):
-            kind = limit_kinds()[each.limit]
-            return NO, f"{each.of} is {kind.shown(each.value)}, allowed {kind.shown(each.bound)}"
-    for name, end in strain_ends(model).items():
-        if max(design.curves.strains[name]) > end.strain * (1.0 + _BROKEN):
-            return NO, f"{name} is stretched further than is stated of it"
-    cam = series_cam(model)
-    parts = {"rubber": cam.specimens, "cable": cam.cable, "coil": cam.coils}
-    unstated = [name for name, there in parts.items() if there and not kept & _STRENGTHS[name]]
-    if unstated:
-        return UNKNOWN, f"no strength is declared, and no limit set, of {' and '.join(unstated)}"
-    return YES, f"within its limits: {', '.join(sorted({each.of for each in strengths}))}"
-
-
-def will_be_known(model: FlatModel, largest: float) -> tuple[str, str]:
-    """Return whether sensors and spreads let an observer know the torque: answer and reason."""
-    try:
-        least = least_torque_error(observer_bench(model))(declared_prior(model))
-    except NlsError as error:
-        return UNKNOWN, str(error)
-    words = f"no observer errs by less than {prefixed(least)} rms over the declared spreads"
-    return (YES if least <= _LARGEST_ERROR * largest else NO), words
-
 
 _CLOUD_DRAWS = 200
 _MOST_FILES = 60
@@ -161,6 +67,7 @@ class Work(StrEnum):
     TOLERANCE = "ToleranceCloud"  # torque of made springs around the design
     LOOP = "TorqueLoop"  # the torque loop over the angle: angles, and a LoopResponse at each
     DIAGNOSIS = "DiagnoseRecords"  # what records say that the declared machine lacks
+    STOCK = "TryStock"  # what can be bought: a row for each combination
     EXPORT = "ExportDesign"  # the design as a file: ExportedDesign
 
 
@@ -195,6 +102,21 @@ def _diagnosis(question: LiveQuestion, _: AngleView | None, folder: Path) -> Cal
     return diagnosis, (question.actuator, folder)
 
 
+def _stock(question: LiveQuestion, _: AngleView | None, choices: tuple[StockChoice, ...]) -> Call:
+    """Return the design from each combination of what can be bought; a size that is chosen so is not free."""
+    combinations(question.actuator, choices)  # what does not fit the machine is refused at once
+    chosen = {each.chosen for each in choices}
+    free = tuple(name for name in question.free if name not in chosen)
+    # What follows from the strength of a rubber, or the travel of a coil, is that of each.
+    follow = {name for name, each in question.limit_values.items() if each.by_default}
+    keep = tuple(
+        each
+        for each in question.keep
+        if type(each).__name__ not in follow and getattr(each, "name", "") not in chosen
+    )
+    return through_stock, (question.actuator, question.target, free, keep, choices, question.held_contour)
+
+
 def _export(_: LiveQuestion, shown: AngleView | None, what: str, note: str) -> Call:
     """Return the export of the last good design; ``note``: what the head of the file says."""
     if what not in EXPORTS:
@@ -209,6 +131,7 @@ _CALLS: Mapping[Work, Callable[..., Call]] = {
     Work.TOLERANCE: _tolerance,
     Work.LOOP: _loop,
     Work.DIAGNOSIS: _diagnosis,
+    Work.STOCK: _stock,
     Work.EXPORT: _export,
 }
 """How each kind of work is called for a question and the design that is shown, with its settings."""
@@ -313,6 +236,32 @@ def diagnosis(stage: Stage, actuator: Assembly, folder: Path) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def through_stock(
+    stage: Stage,
+    actuator: Assembly,
+    target: Target,
+    free: tuple[str, ...],
+    keep: tuple[Limit, ...],
+    choices: tuple[StockChoice, ...],
+    contour: Contour | None,
+) -> dict[str, Any]:
+    """Return what became of each combination of a stock: ``rows`` of label, rms error, met, reason."""
+    count, done = len(combinations(actuator, choices)), 0
+
+    def progress() -> None:
+        nonlocal done
+        done += 1
+        stage(f"{done} of {count} designed")
+
+    stage(f"designs {count} springs")
+    settings = DesignSettings(
+        starts=1, look_for_size_ranges=False, look_for_remedies=False, draws=0, progress=progress,
+        contour=contour,
+    )  # fmt: skip
+    design = design_cam(actuator, target=target, free=(*free, *choices), keep=keep, settings=settings)
+    return {"rows": [(each.choice, each.rms, each.met, each.reason) for each in design.alternatives]}
+
+
 def _designed(shown: AngleView | None) -> AngleView:
     if shown is None:
         raise ValueRangeError("design", "there is none yet", next_step="widen a limit first")
@@ -337,6 +286,7 @@ class FullDesign:
     design: CamDesign | None
     message: str = ""
     lights: tuple[Light, ...] = ()
+    mounting: Mounting | None = None  # the part with its bolts, where one can be made
 
 
 def whole_design(
@@ -367,7 +317,10 @@ def whole_design(
     try:
         design = design_cam(actuator, target=target, free=free, keep=keep, settings=settings)
         stage("asks whether it can be made, will hold and be known")
-        return FullDesign(AnswerState.SOLVED, design, lights=lights_of(design, keep))
+        mounting = mounting_of(design)
+        lights = lights_of(design, keep, mounting)
+        part = None if isinstance(mounting, str) else mounting
+        return FullDesign(AnswerState.SOLVED, design, lights=lights, mounting=part)
     except InfeasibleError as error:
         return FullDesign(AnswerState.INFEASIBLE, None, str(error))
     except ConvergenceError as error:

@@ -68,6 +68,10 @@ STUDIES = {
 }
 
 
+_SERVED = 15
+"""Seconds for which a page is served."""
+
+
 class Commands:
     """Words made from the program's own list of commands and options, half of them unusual."""
 
@@ -143,7 +147,7 @@ class Commands:
         os.chdir(folder)
         sys.argv = ["nlsdesign", *case.words]
         try:
-            outcome = _run()
+            outcome = _run(interrupted=case.words[:1] == ("serve",))
         finally:
             os.chdir(here)
             sys.argv, tempfile.tempdir = words, before
@@ -168,15 +172,20 @@ def _leaves(
         yield from _leaves(inner, (*words, name))
 
 
-def _run() -> Outcome:
+def _run(*, interrupted: bool) -> Outcome:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    if interrupted:  # as by a hand: this command ends in no other way
+        signal.signal(signal.SIGALRM, lambda *_: os.kill(os.getpid(), signal.SIGINT))
+        signal.alarm(_SERVED)
     try:
         main()
     except SystemExit as leaving:
         status = leaving.code or 0
-        if status in (0, 1, 141):
+        if status in (0, 1, 141) or (interrupted and status == 130):
             return Outcome(ACCEPTED)
         return Outcome(REFUSED) if status == 2 else Outcome("traceback", f"exit status {status!r}")
     except BaseException as error:
         return Outcome("traceback", signature(error))
+    finally:
+        signal.alarm(0)
     return Outcome(ACCEPTED)

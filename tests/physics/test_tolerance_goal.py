@@ -27,13 +27,15 @@ from nlsdesign.design import (
     tolerance_analysis,
 )
 from nlsdesign.design.optimisation.problem import design_problem
-from nlsdesign.design.tolerance.causes import spring_causes
+from nlsdesign.design.tolerance.causes import SinceMade, spring_causes
+from nlsdesign.design.tolerance.lasting import lasting_causes
 from nlsdesign.design.tolerance.made_spring import made_spring
 from nlsdesign.foundation.errors import ArrangementError, UnitError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.foundation.spread import NormalSpread, UniformSpread
 from nlsdesign.model import flatten
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, RUBBER, TARGET, actuator
+from tests.physics.test_lasting_tolerance import with_rubber
 from tests.physics.test_tolerance import actuator as arc_actuator
 
 MACHINE = arc_actuator()
@@ -64,7 +66,8 @@ def drawn_quantile(
 ) -> float:
     """The same from draws of the quadratic form, with the sensitivities of the analysis."""
     model = flatten(machine)
-    causes = spring_causes(model, None, goal.rules)
+    lasting = lasting_causes(model, None, np.linspace(0.0, target.last_angle, 401))[0]
+    causes = (*spring_causes(model, None, goal.rules), *lasting)
     trims = [] if goal.trims == () else [Trim("spring.pretension")]
     columns = [trim.column(model, model.springs[0].cams[0])[0] for trim in trims]
     made = made_spring(model, None, target=target, causes=(*causes, *columns), angles=401)
@@ -76,7 +79,8 @@ def drawn_quantile(
     error = (made.nominal - made.wanted) * root
     normal = np.random.default_rng(4).standard_normal((count, len(causes)))
     # To first order a factor is normal, as the goal takes it; a range has ends.
-    kinds = [c.spread if isinstance(c.spread, UniformSpread) else NormalSpread(1.0) for c in causes]
+    kept = (UniformSpread, SinceMade)
+    kinds = [c.spread if isinstance(c.spread, kept) else NormalSpread(1.0) for c in causes]
     x = np.column_stack([kind.deviate(column) for kind, column in zip(kinds, normal.T, strict=True)])
     squares = error @ error + 2 * x @ (rows @ error) + np.einsum("ij,jk,ik->i", x, rows @ rows.T, x)
     return float(np.sqrt(np.quantile(squares, goal.share)))
@@ -108,6 +112,18 @@ def test_ranges_have_a_lower_tail() -> None:
     bounded = goal_in_newton_metres(goal, target)
     assert bounded == pytest.approx(drawn_quantile(goal, target), rel=0.04)
     assert bounded < 0.7 * goal_in_newton_metres(ToleranceQuantile(rules=RULES, trims=()), target)
+
+
+@pytest.mark.parametrize("trims", [None, ()], ids=["trimmed", "as built"])
+@pytest.mark.parametrize("takes", [{"share": 0.3}, {"time": 600.0}], ids=["set", "creep"])
+def test_what_time_takes_is_counted(takes: dict[str, float], trims: tuple[str, ...] | None) -> None:
+    """A share between nothing and the whole, on one side: a mean besides a variance."""
+    machine = with_rubber(**takes)
+    goal, target = ToleranceQuantile(trims=trims, rules=RULES), own_torque(machine)
+    found = goal_in_newton_metres(goal, target, machine)
+    assert found == pytest.approx(drawn_quantile(goal, target, machine), rel=0.04)
+    if trims == ():
+        assert found > 1.01 * goal_in_newton_metres(goal, target, with_rubber(time=0.1))
 
 
 def test_without_spreads_it_is_the_nominal_error() -> None:

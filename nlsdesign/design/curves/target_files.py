@@ -67,7 +67,8 @@ def read_columns(
 _NAMES = {
     "winkel": "angle", "drehmoment": "torque", "moment": "torque", "steifigkeit": "stiffness",
     "gewicht": "weight", "couple": "torque", "raideur": "stiffness", "poids": "weight",
-    "rigidez": "stiffness", "momento": "torque", "coppia": "torque",
+    "rigidez": "stiffness", "momento": "torque", "coppia": "torque", "zeit": "time", "temps": "time",
+    "tiempo": "time", "tempo": "time",
 }  # fmt: skip
 """Names of the columns in languages of workshops."""
 

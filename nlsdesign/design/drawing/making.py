@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from ...foundation.errors import NlsError
 from ...foundation.quantity import MM
+from ..curves.numbers import plain
 from ..statics.contour import Contour
 from .cam_part import CamPart
 from .machined_cam import BoltCircle, ClampScrew, MachinedCam, MachinedOneSidedCam
@@ -205,22 +206,30 @@ class Mounting:
             return False
         return True
 
-    def bolts_that_do(self) -> str:
-        """Return bolts in words that carry the torque in shear and fit the part, each tried; else a key."""
+    def bolts_that_carry(self) -> tuple[BoltCircle, str] | None:
+        """Return bolts that carry the torque in shear and fit the part, each tried, and their thread."""
         reach = 2.0 * float(self.contour.radii.max())
         for count in _COUNTS:
             for step in range(_CIRCLES, 2, -1):
                 circle = math.floor(1e3 * reach * step / _CIRCLES) * 1e-3
                 needed = _FACTOR * self.torque / (count * circle / 2.0) / _SHEAR
                 screw = next((each for each in _SCREWS if each.area >= needed), None)
-                if screw is None or not self.fits(
-                    bolts=BoltCircle(count=count, circle=circle, hole=screw.hole)
-                ):
+                if screw is None:
                     continue
-                sizes = f'count = {count}, circle = "{MM * circle:.3g} mm", hole = "{MM * screw.hole:.3g} mm"'
-                held = f"carry {_FACTOR:g} times it in shear ({screw.name}, class 8.8)"
-                return f" -> bolts = {{{sizes}}} fit and {held}"
-        return f" -> no bolts that carry it fit: {self.key_that_does()}"
+                bolts = BoltCircle(count=count, circle=circle, hole=screw.hole)
+                if self.fits(bolts=bolts):
+                    return bolts, screw.name
+        return None
+
+    def bolts_that_do(self) -> str:
+        """Return those bolts in words, or else a key."""
+        carry = self.bolts_that_carry()
+        if carry is None:
+            return f" -> no bolts that carry it fit: {self.key_that_does()}"
+        bolts, thread = carry
+        circle, hole = (MM * plain(size) for size in (bolts.circle, bolts.hole))
+        sizes = f'count = {bolts.count}, circle = "{circle:.3g} mm", hole = "{hole:.3g} mm"'
+        return f" -> bolts = {{{sizes}}} fit and carry {_FACTOR:g} times it in shear ({thread}, class 8.8)"
 
     def key_that_does(self) -> str:
         """Return the key of the bore where it fits and a hub bears it, with its strength; else what to do."""

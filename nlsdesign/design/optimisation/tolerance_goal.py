@@ -8,7 +8,8 @@ tangent t off all sⱼ, but not off e: a design must not lean on it. The mean sq
 
 with the mean over the angle as product, so mean and variance of Q follow from b and G; the distribution in
 between is taken as that of a multiple of χ² with the same two, whose quantile has a closed form. All
-derivatives are exact.
+derivatives are exact. What time takes (:mod:`..tolerance.lasting`) is a share between nothing and the whole:
+half of it is added to e, also without its part along the trims.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ from scipy.special import ndtri
 
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity
+from ...foundation.spread import Spread
 from ...foundation.symbolic import Expression
 from ..curves.numbers import in_si, plain
 from ..tolerance.causes import (
@@ -29,10 +31,12 @@ from ..tolerance.causes import (
     Cause,
     NumberCause,
     ProfileCause,
+    SinceMade,
     SpreadRules,
     WaveCause,
     spring_causes,
 )
+from ..tolerance.lasting import SMALLEST, relaxed_until_measured
 from .design_point import DesignPoint
 from .goals import Goal
 from .limits import Bound, Limit
@@ -105,7 +109,9 @@ class ToleranceQuantile(Goal):
         weights, errors = _weights(design), design.torque_errors
         if not rows:
             return ca.dot(weights, errors**2)
-        left = ca.horzcat(*[row for _, row in rows])
+        # The last column is the mean of what time takes.
+        half = [0.5 * row / _SINCE.slope(0.0) for spread, row in rows if spread is _SINCE]
+        left = ca.horzcat(*[row for _, row in rows], sum(half, start=ca.SX.zeros(errors.shape)))
         result: list[Expression] = []
         for column in tangents:
             for other in result:
@@ -114,10 +120,11 @@ class ToleranceQuantile(Goal):
         for tangent in result:
             along = (weights * tangent).T @ left / (ca.dot(weights, tangent**2) + least)
             left = left - tangent @ along
+        left, errors = left[:, :-1], errors + left[:, -1]
         weighed = ca.diag(weights) @ left
         cross, gram = errors.T @ weighed, left.T @ weighed
         mean = ca.dot(weights, errors**2) + ca.trace(gram)
-        peaked = ca.DM([cause.spread.fourth_moment - 3.0 for cause, _ in rows])
+        peaked = ca.DM([spread.fourth_moment - 3.0 for spread, _ in rows])
         variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + ca.dot(peaked, ca.diag(gram) ** 2)
         # The quantile of a multiple of χ² of which mean and variance are known.
         ratio = (variance + least**2) / (9.0 * mean**2)
@@ -188,13 +195,47 @@ class TrimRoom(Limit):
             yield Bound("TrimRoom", words, expression, value, upper, shown, max(abs(value), 1e-3))
 
 
+_SINCE = SinceMade()
+
+
 def _rows(
     design: DesignPoint, sensitivities: _Sensitivities, rules: SpreadRules
-) -> list[tuple[Cause, Expression]]:
-    """Return the causes that change the torque at rest, each with its change per standard deviation."""
+) -> list[tuple[Spread, Expression]]:
+    """Return the spreads that change the torque at rest, each with its change per standard deviation."""
     causes = spring_causes(design.model, design.cam.drive, rules)
-    rows = [(cause, sensitivities.row(cause)) for cause in causes]
-    return [(cause, row) for cause, row in rows if not row.is_zero()]
+    rows = [(cause.spread, sensitivities.row(cause)) for cause in causes]
+    rows += [(_SINCE, -_SINCE.slope(0.0) * lost) for lost in (*lost_by_set(design), *lost_by_creep(design))]
+    return [(spread, row) for spread, row in rows if not row.is_zero()]
+
+
+def lost_by_set(design: DesignPoint) -> Iterator[Expression]:
+    """Yield the torque that each piece which states a set loses by it, over the nodes."""
+    for piece in design.cam.specimens:
+        if piece.tension_set is None:
+            continue
+        stays = design.parameters[piece.tension_set] * ca.fmax(design.strains[piece.name][0], 0)
+        shorter = ca.fmax(design.extensions - stays * design.parameters[piece.rest_length], 0)
+        forces = ca.vertcat(*[design.element(each).force for each in ca.vertsplit(shorter)])
+        yield design.elements * design.lever_arms * (design.forces - forces)
+
+
+def lost_by_creep(design: DesignPoint) -> Iterator[Expression]:
+    """Yield the torque that relaxation takes after it was measured, with its times as declared."""
+    if not design.cam.states:
+        return
+    try:
+        relaxing = design.relaxing.function
+    except ArrangementError:
+        return
+    model, stretched = design.model, design.model.values[design.cam.pretension]
+    left, grown = relaxed_until_measured(relaxing, stretched, model.start(model.parameters))
+    if np.max(np.abs(left)) < SMALLEST:
+        return
+    numbers, forces = ca.vertcat(*[design.parameters[v.name] for v in model.parameters]), []
+    for extension in ca.vertsplit(design.extensions):
+        rates = relaxing.call([extension, ca.SX(0), ca.SX.zeros(len(left)), numbers])[1]
+        forces.append(relaxing.call([extension, ca.SX(0), ca.mtimes(ca.DM(grown), rates), numbers])[0])
+    yield design.elements * design.lever_arms * ca.vertcat(*forces)
 
 
 def _weights(design: DesignPoint) -> Expression:

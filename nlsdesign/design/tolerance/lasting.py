@@ -8,6 +8,7 @@ that is said. Source: ISO 2285 (tension set).
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 from scipy.linalg import expm
 
@@ -75,26 +76,32 @@ def loss_by_relaxation(
         relaxing = relaxing_law(model, law.cam.drive).function
     except ArrangementError as error:
         return None, f"creep: not counted: {error}"
-    count = len(law.cam.states)
-
-    def at(extension: float, states: Array) -> tuple[float, Array]:
-        force, rates = relaxing(extension, 0.0, states, law.numbers)
-        return float(force), np.array(rates, dtype=float).ravel()
-
     lost = []
     for extension in stretch:
-        offset = at(extension, np.zeros(count))[1]
-        slopes = np.column_stack([at(extension, unit)[1] - offset for unit in np.eye(count)])
-        # One more state that stays at one carries the offset along.
-        flow = np.block([[slopes, offset[:, None]], [np.zeros((1, count + 1))]])
-        states = expm(flow * MEASURED_AFTER)[:-1, -1]
-        lost.append(at(extension, states)[0])
+        offset = np.array(relaxing(extension, 0.0, 0.0, law.numbers)[1], dtype=float).ravel()
+        states = relaxed_until_measured(relaxing, extension, law.numbers)[1] @ offset
+        lost.append(float(relaxing(extension, 0.0, states, law.numbers)[0]))
     lost = arms * np.array(lost)
     after = f"{MEASURED_AFTER:g} s after it was stretched"
     if np.max(np.abs(lost)) < SMALLEST * np.max(np.abs(arms * law.force(stretch))):
         return None, f"creep: what is declared to relax in '{law.element}' is over {after}"
     source = f"declared: relaxation of '{law.element}' that is not over {after}, when its torque is measured"
     return _cause(f"{law.element}.creep", lost, source), f"creep: {source}"
+
+
+def relaxed_until_measured(relaxing: ca.Function, extension: float, numbers: Array) -> tuple[Array, Array]:
+    """Return e^(A·t) and its integral until a new spring is measured.
+
+    ``relaxing``: function of a :class:`~..statics.equilibrium.RelaxingLaw`, affine in its states.
+    """
+    count = relaxing.size1_in(2)
+    offset, *columns = (
+        np.array(relaxing(extension, 0.0, states, numbers)[1], dtype=float).ravel()
+        for states in (np.zeros(count), *np.eye(count))
+    )
+    slopes = np.column_stack(columns) - offset[:, None]
+    flow = expm(MEASURED_AFTER * np.block([[slopes, np.eye(count)], [np.zeros((count, 2 * count))]]))
+    return flow[:count, :count], flow[:count, count:]
 
 
 def _cause(name: str, lost: Array, source: str) -> LastingCause:

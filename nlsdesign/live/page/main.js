@@ -7,6 +7,7 @@ import { announce, byId, make, text } from "./elements.js";
 import { MechanismPicture } from "./mechanism.js";
 import { AtAngle, Panels, sitsOn } from "./panels.js";
 import { Questions } from "./questions.js";
+import { Stock } from "./stock.js";
 import { TaskCard } from "./task.js";
 import { TargetEditor, torqueRange } from "./target_editor.js";
 import { interpolated } from "./chart.js";
@@ -47,6 +48,7 @@ const atAngle = new AtAngle(byId("linear-row"), ask);
 const compare = new Compare(ask);
 const tolerance = new Tolerance(ask);
 const diagnosis = new Diagnosis(ask);
+const stock = new Stock((message) => ask({ ...message, angle }));
 const task = new TaskCard(byId("task"), edit);
 const limits = new Rows(byId("limits"), "limit", {
   change: (limit, value, last) => edit({ edit: "ChangeLimit", limit, value }, { drag: `limit ${limit}`, last }),
@@ -141,6 +143,7 @@ function takeWork(work) {
   if (work.name === "SettleDesign") { full = work; showState(); fade(); }
   if (work.name === "ToleranceCloud") { lastCloud = work; tolerance.show(work, answer); }
   if (work.name === "DiagnoseRecords") diagnosis.show(work);
+  if (work.name === "TryStock") stock.show(work);
   if (work.name === "TorqueLoop") atAngle.showLoopWork(work);
 }
 
@@ -158,6 +161,7 @@ function showAnswer() {
   const frozen = editor.moving;
   table.show(controls.points.map((each) => [each[0], each[1]]));
   task.show(controls);
+  stock.offer(controls);
   showCurve(frozen);
   limits.show(controls.limits.map(limitRow));
   showKinds();

@@ -11,7 +11,8 @@ export class MechanismPicture {
     this.whole = draw("svg", { class: "mechanism", role: "img", preserveAspectRatio: "xMidYMid meet" });
     this.world = draw("g", { id: "mechanism-world", transform: "scale(1,-1)" });
     this.wholeBar = draw("g", {});
-    this.whole.append(this.world, this.wholeBar);
+    this.sizes = draw("g", { class: "sizes" });
+    this.whole.append(this.world, this.wholeBar, this.sizes);
     // The cam alone, larger: the same elements once more.
     this.near = draw("svg", { class: "mechanism near", "aria-hidden": "true", preserveAspectRatio: "xMidYMid meet" });
     this.nearBar = draw("g", {});
@@ -50,13 +51,31 @@ export class MechanismPicture {
       put(`guide${k}`, "circle", { class: "guide", cx: guide[0], cy: guide[1], r: size });
       put(`contact${k}`, "circle", { class: "contact", cx: contact[0], cy: contact[1], r: size });
     });
+    // The part as it is cut, once it is checked: its edge under the cable, and its holes.
+    mechanism.edges.forEach((points, k) => put(`edge${k}`, "path", { class: "edge", d: `${path(mm(points))}Z` }));
+    mechanism.holes.forEach(([x, y, r], k) => put(`hole${k}`, "circle", { class: "hole", cx: x * 1e3, cy: y * 1e3, r: r * 1e3 }));
     put("reach", "circle", { class: "reach-circle", cx: 0, cy: 0, r: radius });
     put("centre", "circle", { class: "centre", cx: 0, cy: 0, r: size });
     for (const [name, part] of this.parts) if (!used.has(name)) { part.remove(); this.parts.delete(name); }
     this.frame(wide, high, mechanism.halves.length > 1, Number(radius.toPrecision(2)));
+    this.showSizes(mechanism.dimensions, wide);
     text(this.now, `${withUnit(mechanism.angle, "rad", 3)} · radius of the cam ${plain(radius, 3)} mm`);
     text(this.remark, mechanism.remark);
     set(this.whole, { "aria-label": `Cam, cable and rubber to scale at ${withUnit(mechanism.angle, "rad", 3)}: cam radius ${plain(radius, 3)} mm, lever arm ${plain(arm, 3)} mm` });
+  }
+
+  // Dimension lines with their size in mm; their text stands upright, so it is drawn outside the turned world.
+  showSizes(rows, wide) {
+    const tall = 0.03 * wide, size = 0.068 * wide;
+    this.sizes.replaceChildren(...rows.flatMap(([words, ...ends]) => {
+      const [x0, y0, x1, y1, long] = ends.map((each) => each * 1e3);
+      // Beside a line below the cam, below one at the rubber.
+      const [at, anchor] = x0 < 0 ? [x0 - tall, "end"] : x0 === 0 ? [x1 + tall, "start"] : [(x0 + x1) / 2, "middle"];
+      return [
+        draw("path", { class: "dimension", d: `M${x0} ${-y0 - tall / 2}v${tall}M${x0} ${-y0}H${x1}M${x1} ${-y1 - tall / 2}v${tall}` }),
+        draw("text", { x: at, y: -y0 + (anchor === "middle" ? 1.3 : 0.35) * size, "text-anchor": anchor, "font-size": size }, `${words} ${plain(long, 3)} mm`),
+      ];
+    }));
   }
 
   // Why there is no picture for this design; the one that is seen belongs to an earlier one.

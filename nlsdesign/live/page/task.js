@@ -1,6 +1,7 @@
 // What the joint has to do, and what the motor pays for it with this spring and with others.
 
-import { make, text } from "./elements.js";
+import { upload } from "./connection.js";
+import { announce, make, text } from "./elements.js";
 import { editable, plain, typed } from "./units.js";
 
 const FIELDS = [
@@ -27,8 +28,13 @@ export class TaskCard {
     this.table = make("table", { class: "paid" });
     this.words = make("p", { class: "job" });
     this.given = make("div", { class: "given" }, ...this.motor.map((each) => each.label), this.follow);
-    this.purpose = make("p", { class: "job" }, "Choose a joint: the page says what heat and peak power the motor pays in walking, with this spring and with others.");
-    host.append(make("div", { class: "head" }, make("h3", {}, "Task of the joint: walking")), make("div", { class: "halves row" },
+    this.take = make("button", { type: "button", onclick: () => edit({ edit: "TakeGearRatio" }) }, "Put this gear ratio into the deck");
+    this.given.append(this.take);
+    this.own = make("input", { type: "file", accept: ".csv", class: "unseen", "aria-label": "Choose a record of your own as a task" });
+    this.own.addEventListener("change", () => this.load());
+    this.record = make("label", { class: "button" }, "Own record (CSV)", this.own);
+    this.purpose = make("p", { class: "job" }, "Choose a joint in walking, or a record of one period with the columns time, angle and torque. The page says what heat and peak power the motor pays, with this spring and with others.");
+    host.append(make("div", { class: "head" }, make("h3", {}, "Task of the joint"), this.record), make("div", { class: "halves row" },
       make("div", {}, this.purpose, this.list, this.given, this.wrong), make("div", {}, make("div", { class: "scroll", tabindex: 0, role: "region", "aria-label": "Motor over the task" }, this.table), this.words)));
     this.answer = null;
   }
@@ -41,30 +47,44 @@ export class TaskCard {
     while (this.rows.length < wanted) this.rows.push(this.row(this.rows.length));
     this.rows.forEach(({ select, fields, drop, labels }, k) => {
       const task = tasks[k];
+      // A record of one's own is offered where it stands.
+      const own = task && task[4] !== "walking" ? task[0] : "";
+      if (own !== select.dataset.own) { select.dataset.own = own; select.replaceChildren(...this.offered(own)); }
       if (document.activeElement !== select) select.value = task ? task[0] : "";
       select.setAttribute("aria-label", task ? `Task ${k + 1}: joint` : "Add a task: joint");
       drop.hidden = !task;
-      labels.forEach((each, n) => { each.hidden = !task || (n === 2 && tasks.length < 2); });
+      labels.forEach((each, n) => { each.hidden = !task || (n === 0 && task[4] === "own") || (n === 2 && tasks.length < 2); });
       if (task) FIELDS.forEach(({ factor }, n) => this.put(fields[n], editable(task[n + 1] * factor)));
     });
     for (const { name, field } of this.motor) {
       this.put(field, motor[name] === undefined ? "" : editable(motor[name]));
       field.placeholder = "of the deck";
     }
+    this.take.hidden = motor.gear_ratio === undefined;
+    this.record.hidden = tasks.length >= MOST;
     this.purpose.hidden = tasks.length > 0;
     this.given.hidden = this.words.hidden = tasks.length === 0;
     if (tasks.length === 0) { this.answer = null; text(this.words, ""); }
     this.table.parentElement.hidden = this.answer === null || this.answer.rows.length === 0;
   }
 
-  offered() {
-    return ["", ...this.joints].map((value) => make("option", { value }, value || "no task"));
+  async load() {
+    const [file] = this.own.files;
+    this.own.value = "";
+    if (!file) return;
+    const wrong = await upload(`/api/open?kind=task&name=${encodeURIComponent(file.name)}`, file);
+    text(this.wrong, wrong);
+    if (!wrong) announce(`${file.name} is a task now.`);
+  }
+
+  offered(own = "") {
+    return ["", ...this.joints, ...(own ? [own] : [])].map((value) => make("option", { value }, value || "no task"));
   }
 
   // The joints of which there are tables; they come after the first answer.
   offer(joints) {
     this.joints = joints;
-    this.rows.forEach(({ select }, k) => { select.replaceChildren(...this.offered()); select.value = this.tasks[k]?.[0] ?? ""; });
+    this.rows.forEach(({ select }, k) => { select.replaceChildren(...this.offered(select.dataset.own)); select.value = this.tasks[k]?.[0] ?? ""; });
   }
 
   put(field, words) {
@@ -80,13 +100,13 @@ export class TaskCard {
     const labels = FIELDS.map(({ words, unit }, n) => make("label", {}, `${words} `, fields[n], ` ${unit}`));
     const drop = make("button", { type: "button", "aria-label": `Drop task ${k + 1}`, onclick: () => this.edit({ edit: "DropTask", index: k }) }, "×");
     const sent = (changed) => {
-      const [joint, ...numbers] = this.tasks[k];
+      const [joint, ...numbers] = this.tasks[k].slice(0, 4);
       const now = Object.fromEntries(FIELDS.map(({ name }, n) => [name, numbers[n]]));
       this.edit({ edit: "SetTask", index: k, joint, ...now, ...changed });
     };
     select.addEventListener("change", () => {
       if (this.tasks[k]) return select.value ? sent({ joint: select.value }) : this.edit({ edit: "DropTask", index: k });
-      const mass = this.tasks.length ? this.tasks[0][1] : 75;
+      const mass = this.tasks.find((each) => each[4] !== "own")?.[1] ?? 75;
       if (select.value) this.edit({ edit: "SetTask", index: k, joint: select.value, body_mass: mass });
     });
     FIELDS.forEach(({ name, factor }, n) => fields[n].addEventListener("change", () => this.entered(fields[n], (value) => sent({ [name]: value / factor }))));

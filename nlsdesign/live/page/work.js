@@ -153,7 +153,7 @@ export class Diagnosis {
   }
 }
 
-function ended(work) {
+export function ended(work) {
   return work.state === "cancelled" ? "stopped" : `${work.state}: ${work.message}`;
 }
 

@@ -10,12 +10,14 @@ import pytest
 
 from nlsdesign.components import declare
 from nlsdesign.components.assembly.deck_writer import deck_text
-from nlsdesign.design import CamDesign
+from nlsdesign.design import CamDesign, tolerance_analysis
+from nlsdesign.design.drawing.making import bolt_load
 from nlsdesign.design.optimisation.result import Miss
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.live.gallery import gallery_question
+from nlsdesign.live.lights import can_be_made, mounting_of, will_be_known, will_hold
 from nlsdesign.live.question import LiveQuestion
-from nlsdesign.live.work import FullDesign, can_be_made, whole_design, will_be_known, will_hold
+from nlsdesign.live.work import FullDesign, whole_design
 from nlsdesign.model import flatten
 
 NUMBER = r"{value = [-\d.e]+"
@@ -64,7 +66,7 @@ def test_what_no_workshop_could_make_is_told(design: CamDesign) -> None:
         (with_deck(design, f"cable_diameter = {NUMBER}", "cable_diameter = {value = 9.0"), "no", "cable"),
         (with_deck(design, "^cable_.*\n", ""), "unknown", "declares no cable"),
     ):
-        found = can_be_made(changed, flatten(changed.actuator))
+        found = can_be_made(changed, mounting_of(changed))
         assert found[0] == answer, found
         assert words in found[1]
 
@@ -73,7 +75,7 @@ def test_a_trim_is_not_asked_for_where_springs_are_good_as_they_come(design: Cam
     made = design.tolerance
     assert made is not None
     fine = replace(made, quantiles=(*made.quantiles[:-1], replace(made.quantiles[-1], value=0.02)))
-    answer, words = can_be_made(replace(design, tolerance=fine), flatten(design.actuator))
+    answer, words = can_be_made(replace(design, tolerance=fine), mounting_of(design))
     assert answer == "yes"
     assert "bench" not in words
 
@@ -108,3 +110,34 @@ def test_a_torque_that_sensors_do_not_show_is_told(design: CamDesign) -> None:
         found = will_be_known(flatten(changed.actuator), changed.target.largest)
         assert found[0] == answer, found
         assert words in found[1]
+
+
+def test_bolts_that_carry_the_torque_are_part_of_what_is_made(full: FullDesign, design: CamDesign) -> None:
+    mounting = full.mounting
+    assert mounting is not None
+    load = bolt_load(mounting.part, mounting.torque)
+    assert load is not None
+    assert load.carried
+    assert f"{load.bolts} bolts carry" in full.lights[0].words
+    # No bolt from M1.6 to M6 carries a thousand times as much on so small a cam.
+    heavy = replace(mounting, machined=replace(mounting.machined, bolts=None), torque=1e3 * mounting.torque)
+    assert heavy.bolts_that_carry() is None
+    assert can_be_made(design, heavy)[0] == "unknown"
+    assert "no bolts that carry" in can_be_made(design, heavy)[1]
+
+
+def test_what_time_takes_is_told_and_too_much_of_it_is_red(design: CamDesign, question: LiveQuestion) -> None:
+    names = {type(each).__name__ for each in question.keep}
+    answer, words = will_hold(design, flatten(design.actuator), names)
+    assert answer == "yes"
+    assert "states no tension_set (ISO 2285)" in words
+    for share, expected, named in (
+        (0.02, "yes", "2 % of the strain at rest stays"),
+        (0.4, "no", "time takes"),
+    ):
+        stated = f'\\g<0>\ntension_set = {{value = {share}, unit = "1", source = "ISO 2285"}}'
+        lasting = with_deck(design, r"^rest_length = .*$", stated)
+        made = tolerance_analysis(lasting.actuator, target=design.target, draws=40)
+        found = will_hold(replace(lasting, tolerance=made), flatten(lasting.actuator), names)
+        assert found[0] == expected, found
+        assert named in found[1]

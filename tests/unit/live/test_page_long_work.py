@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import zipfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,6 +34,7 @@ pytestmark = [
 TEXT = "document.getElementById('{0}').textContent"
 CHECKED = "document.getElementById('state-name').textContent.startsWith('checked')"
 STALE = "document.getElementById('{0}').classList.contains('stale')"
+AREA = "spring.rubber.area"
 PATHS = "document.querySelectorAll('#{0} svg.chart:not(.empty) .lines path').length"
 
 
@@ -370,3 +372,43 @@ def test_a_law_of_ones_own_reaches_the_check_and_the_cloud(root: Path, tmp_path:
         computed(tab, "tolerance-run", "made springs: 95 %", "tolerance-state")
         assert tab.evaluate("document.getElementById('notice').hidden")
         assert tab.messages == []
+
+
+def test_a_record_a_ratio_and_a_stock_by_hand(tab: Tab, tmp_path: Path) -> None:
+    """What the page takes beside the curve, and what the mechanism shows once it is checked."""
+    assert tab.evaluate("document.querySelectorAll('#mechanism-world .hole').length") >= 4
+    assert "cam radius" in tab.evaluate("document.querySelector('.mechanism .sizes').textContent")
+    file = tmp_path / "squat.csv"
+    rows = (
+        f"{k / 100},{0.3 * math.sin(k * math.pi / 50)},{0.3 * math.sin(k * math.pi / 50)}\n"
+        for k in range(101)
+    )
+    file.write_text("time_s,angle_rad,torque_Nm\n" + "".join(rows), encoding="utf-8")
+    tab.evaluate("document.querySelector('#task input[type=file]').id = 'own'")
+    tab.choose("own", file)
+    tab.until("document.querySelector('#task select').value === 'squat.csv'")
+    assert tab.evaluate("[...document.querySelectorAll('#task .task label')][0].hidden"), (
+        "no body mass is asked for"
+    )
+    tab.evaluate(
+        "(() => { const field = document.querySelectorAll('#task .given input')[1];"
+        " field.value = '20'; field.dispatchEvent(new Event('change')); })()"
+    )
+    take = "[...document.querySelectorAll('#task button')].find((one) => /^Put/.test(one.textContent))"
+    tab.until(f"!{take}.hidden")
+    tab.evaluate(f"{take}.click()")
+    tab.until(f"{take}.hidden")
+    resting(tab)
+    tab.evaluate(
+        "(() => { const [size, values] = document.querySelectorAll('#stock select, #stock input[type=text]');"
+        f" size.value = '{AREA}'; size.dispatchEvent(new Event('change')); values.value = '40 50';"
+        " document.getElementById('stock-rubbers').checked = false;"
+        " document.querySelector('#stock .task button').click(); })()"
+    )
+    tab.until("document.querySelectorAll('#stock tbody tr').length === 2", seconds=120)
+    tab.evaluate("document.querySelectorAll('#stock tbody button')[1].click()")
+    resting(tab)
+    number = (
+        "[...document.querySelectorAll('#sizes .control')].find((one) => one.textContent.includes('.area'))"
+    )
+    tab.until(f"{number}.querySelector('input').value === '50'")

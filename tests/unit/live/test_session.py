@@ -18,12 +18,16 @@ import pytest
 
 import nlsdesign as nls
 from nlsdesign.bench.identification import load_records
-from nlsdesign.design import tolerance_analysis
+from nlsdesign.design import RubberStock, tolerance_analysis
 from nlsdesign.design.statics.equilibrium import equilibrium_torque
 from nlsdesign.foundation.deck import read_deck
 from nlsdesign.foundation.errors import NlsError
+from nlsdesign.foundation.locations import folder
+from nlsdesign.foundation.rubber_library import materials
+from nlsdesign.live.edits import change_limit, edit
 from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.sessions import Uploads
+from nlsdesign.live.work import _stock
 from tests.command_line import Run, run
 from tests.live_session import Message, Session, as_csv, bench_records, session
 from tests.unit.bench.identification.test_tables import WRITERS
@@ -48,7 +52,7 @@ def begun(quiet: None, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Ses
 @pytest.fixture
 def one(begun: Session) -> Session:
     """The session as it began, but for what it was asked to compute."""
-    for work in ("ToleranceCloud", "TorqueLoop", "DiagnoseRecords"):
+    for work in ("ToleranceCloud", "TorqueLoop", "DiagnoseRecords", "TryStock"):
         begun.work(work, stop=True, over=False)
     while shown(begun)["controls"]["can_undo"]:
         begun.ask(what="step", back=True)
@@ -396,6 +400,93 @@ def test_a_saved_design_is_designed_again_by_the_command_line(one: Session, run:
     assert status == 0, err
     error = json.loads(out)["torque_error_rms"]
     assert error == pytest.approx(answer["design"]["rms_error"], abs=1e-3 * max(rows(answer)["torque"]))
+
+
+# --- what can be bought, and tasks of one's own ---------------------------------------------------
+
+
+def tried(one: Session, **fields: Any) -> Message:
+    first = one.ask(what="stock", **fields)
+    if first["what"] == "refused":
+        return first
+    return one.news("TryStock", lambda work: work["state"] != "computing")
+
+
+def test_a_stock_is_designed_and_one_of_it_taken(one: Session) -> None:
+    news = tried(one, rubbers=False, size=AREA, values=[4e-5, 5e-5])
+    assert news["state"] == "done", news["message"]
+    labels = [row[0] for row in news["value"]["rows"]]
+    assert labels == [f"{AREA} = 40 mm²", f"{AREA} = 50 mm²"]
+    assert all(met and rms < 1e-3 for _, rms, met, _ in news["value"]["rows"])
+    one.edit("FreeNumber", name=AREA)
+    taken = one.ask(what="stock", take=1)["answer"]
+    size = next(each for each in taken["controls"]["numbers"] if each[0] == AREA)
+    assert (size[1], size[4]) == (pytest.approx(5e-5), False), "held at what was bought"
+    assert "chosen from the stock" in size[7]
+    assert "is not there" in one.ask(what="stock", take=7)["reason"]
+
+
+def test_what_follows_from_a_rubber_is_not_asked_of_another(one: Session) -> None:
+    """The strength of the declared rubber is no limit of one that is bought."""
+    asked = edit(change_limit, "MaximumCamRadius", 0.05).applied(one.live.question)
+    assert "MaximumStress" in asked.limit_values
+    _, (_, _, _, keep, _, _) = _stock(asked, None, (RubberStock(("PMC-770",)),))
+    assert {type(each).__name__ for each in keep} == set(asked.limits)
+
+
+# Quicker: the test of a size above.
+@pytest.mark.slow
+def test_rubbers_of_the_library_are_a_stock(one: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = {
+        name: each for name, each in materials().items() if name in ("PMC-770", "Dragon_Skin_30", "EPDM")
+    }
+    monkeypatch.setattr("nlsdesign.live.session_design.materials", lambda: known)
+    assert [row[0] for row in tried(one, rubbers=True)["value"]["rows"]] == [
+        "rubber of PMC-770", "rubber of Dragon_Skin_30"
+    ]  # fmt: skip
+    assert one.ask(what="stock", take=1)["answer"]["controls"]["material"] == "Dragon_Skin_30"
+
+
+def test_a_stock_that_is_none_is_refused(one: Session) -> None:
+    for fields, words in (
+        ({"rubbers": False}, "is empty"),
+        ({"size": AREA, "values": []}, "is an empty list"),
+        ({"size": AREA, "values": ["2"]}, "is no finite number"),
+        ({"size": AREA, "values": [4e-5, 4e-5]}, "twice"),
+        ({"size": "spring.rubber.aera", "values": [4e-5]}, "spring.rubber.area"),
+        ({"take": True}, "was not tried"),
+    ):
+        assert words in one.ask(what="stock", **fields)["reason"], fields
+    assert "coil" in one.open(b"number, rate [N/mm]\n1, 2.0\n", kind="coils", name="list.csv")
+
+
+@pytest.mark.slow
+def test_coils_of_a_list_are_a_stock(quiet: None, tmp_path: Path) -> None:
+    lines = (folder("models") / "coils" / "example.csv").read_text().splitlines()
+    chosen = "\n".join(line for line in lines if line.startswith(("number", "2815", "3217")))
+    with session("coil_cable_drive", tmp_path) as one:
+        assert shown(one)["controls"]["stock"] == ["coil"]
+        assert one.open(chosen.encode(), kind="coils", name="../list.csv") == ""
+        news = one.news("TryStock", lambda work: work["state"] in ("done", "failed"))
+        assert news["state"] == "done", news["message"]
+        rows = news["value"]["rows"]
+        assert [row[0].split(" of ")[0] for row in rows] == [
+            "spring.coil = no. 2815",
+            "spring.coil = no. 3217",
+        ]
+        assert not (tmp_path.parent / "list.csv").exists()
+
+
+def test_a_task_of_ones_own_is_handed_over(one: Session) -> None:
+    time = np.linspace(0.0, 1.0, 51)
+    swing = np.sin(2 * np.pi * time)
+    rows = "\n".join(f"{t},{0.3 * s},{0.2 * s}" for t, s in zip(time, swing, strict=True))
+    assert one.open(f"time_s,angle_rad,torque_Nm\n{rows}\n".encode(), kind="task", name="lift me.csv") == ""
+    assert shown(one)["controls"]["tasks"] == [["lift_me.csv", 1.0, 1.0, 1.0, "own"]]
+    one.edit("SetMotor", name="gear_ratio", value=20.0)
+    assert one.edit("TakeGearRatio")["answer"]["controls"]["motor"] == {}
+    refused = one.open(b"time_s,angle_rad\n0,0\n", kind="task", name="half.csv")
+    assert "has no column 'torque'" in refused or "rows" in refused
 
 
 # --- edits ----------------------------------------------------------------------------------------

@@ -15,14 +15,19 @@ from nlsdesign.live.edits import edit, move_point
 from nlsdesign.live.gallery import gallery_question
 from nlsdesign.live.live_design import LiveDesign
 from nlsdesign.live.question import LiveQuestion
+from nlsdesign.live.saved import reopened, saved
 from nlsdesign.live.tasks import (
     MOST_TASKS,
     MotorRow,
+    _task,
+    add_record,
     drop_task,
     follow_tasks,
     motor_over_tasks,
+    record_of,
     set_motor,
     set_task,
+    take_gear_ratio,
 )
 
 
@@ -173,3 +178,59 @@ def test_a_spring_that_ends_a_little_early_is_taken_to_go_on(followed: LiveQuest
     *others, (angle, torque) = followed.points
     short = edit(move_point, len(others), angle, 0.995 * torque).applied(followed)
     assert not paid(short)["target as drawn"].reason
+
+
+def written(rows: str, per_mass: bool) -> bytes:
+    """A German table of a squat: half a second down, half a second up."""
+    head = "Zeit [ms];Winkel [°];Drehmoment [N*m" + ("/kg]" if per_mass else "]")
+    return f"{head}\n{rows}".replace(".", ",").encode("cp1252")
+
+
+SWING = [math.sin(2.0 * math.pi * k / 100) for k in range(101)]
+ROWS = "".join(f"{10.0 * k:.1f};{20.0 * s:.6f};{0.4 * s:.6f}\n" for k, s in enumerate(SWING))
+
+
+@pytest.mark.parametrize("per_mass", [False, True], ids=["torque", "per mass"])
+def test_a_record_of_ones_own_is_a_task(per_mass: bool) -> None:
+    question = gallery_question("cam-actuator")
+    record = record_of(written(ROWS, per_mass), "squat.csv")
+    assert (record.period, record.per_mass) == (pytest.approx(1.0), per_mass)
+    own = edit(set_task, 0, "squat.csv", 2.0, 1.0).applied(
+        edit(add_record, "squat.csv", record).applied(question)
+    )
+    assert own.tasks[0].row == ("squat.csv", 2.0, 1.0, 1.0, "per mass" if per_mass else "own")
+    largest = 0.8 if per_mass else 0.4
+    assert _task(own.tasks[0]).sampled().torque.max() == pytest.approx(largest, rel=1e-4)
+    assert _task(own.tasks[0]).sampled().angle.max() == pytest.approx(np.radians(20.0), rel=1e-4)
+    assert {"no spring", "least heat"} <= set(paid(own))
+    # What is changed later keeps the record, and a saved design brings it back.
+    changed = edit(set_task, 0, "squat.csv", 2.0, 0.5).applied(own)
+    assert changed.tasks[0].record == record
+    assert reopened(saved(changed, {}))[0].tasks == changed.tasks
+    many = replace(changed, tasks=MOST_TASKS * changed.tasks)
+    with pytest.raises(ValueRangeError, match="drop one first"):
+        edit(add_record, "other.csv", record).applied(many)
+
+
+def test_a_record_that_is_none_says_why() -> None:
+    for rows, words in (("", "rows"), (ROWS.replace("0.4", "x"), "no finite number|number")):
+        with pytest.raises(NlsError, match=words):
+            record_of(written(rows, False), "squat.csv")
+    texts = saved(gallery_question("cam-actuator"), {})
+    begin = texts.begin.replace("tasks = []", 'tasks = [["a.csv", 1.0, 1.0, 1.0, [1.0, true, [0.0]]]]')
+    assert begin != texts.begin
+    with pytest.raises(ValueRangeError, match="task of your own"):
+        reopened(replace(texts, begin=begin))
+
+
+@pytest.mark.parametrize("deck", ["cam-actuator", "one_sided_cable_drive"])
+def test_the_ratio_that_is_tried_goes_into_the_deck(deck: str) -> None:
+    question = edit(set_motor, "gear_ratio", 23.0).applied(gallery_question(deck))
+    tried = motor_and_gear(question.machine.model, resistance=1.0).geared(23.0)
+    taken = edit(take_gear_ratio).applied(question)
+    assert taken.motor == {}
+    for name, value in vars(motor_and_gear(taken.machine.model, resistance=1.0)).items():
+        assert value == pytest.approx(getattr(tried, name), rel=1e-9), name
+    assert "23:1, taken over from the live page" in saved(taken, {}).deck
+    with pytest.raises(ValueRangeError, match="none is tried"):
+        edit(take_gear_ratio).applied(taken)

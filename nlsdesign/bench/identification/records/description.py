@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -107,9 +108,10 @@ class RecordsDescription:
         if self.records is not None:
             held = [r.name for r in self.records.records if r.role == "held_out"]
             lines += [f"# held_out = {json.dumps(held, ensure_ascii=False)}    # the default"]
-        if self.clocks:
-            slowest = min(c.rate for c in self.columns if c.rate > 0.0)
-            lines += [f"resample_Hz = {slowest:.4g}    # one clock for all columns"]
+        # A column that is left out slows nobody down; who takes it in finds the rate beside it.
+        used = [c for c in self.columns if not self.question(c)]
+        if any(c.clock for c in used):
+            lines += [f"resample_Hz = {_slowest(used):.4g}    # one clock for all columns"]
         unit = f"unit = {_quoted(self.time_unit)}"
         guessed = "    # guessed from the steps: correct it" if self.time_is_guessed else ""
         lines += ["", "[time]", f"column = {_quoted(self.time or 't_s')}", unit + guessed]
@@ -124,10 +126,16 @@ class RecordsDescription:
         signal = _quoted(column.signals[0] if column.signals else "")
         lines += [f"{mark}[columns.{_quoted(column.head)}]", f"{mark}signal = {signal}"]
         lines += [f"{mark}unit = {_quoted(column.unit)}"]
-        lines += [f"{mark}time = {_quoted(column.clock)}"] if column.clock else []
+        if column.clock:
+            lines += [f"{mark}time = {_quoted(column.clock)}"]
+            lines += [f"# needs resample_Hz = {_slowest(self.columns):.4g} at the top"] if question else []
         lines += [f"# noise = {column.noise:.3g}    # as estimated", f"# quantum = {column.quantum:.4g}"]
         ways = '# between_samples = "held"    # "held", "held_before", "averaged" or "sampled"'
         return [*lines, ways] if column.drives else lines
+
+
+def _slowest(columns: Iterable[DescribedColumn]) -> float:
+    return min(column.rate for column in columns if column.rate > 0.0)
 
 
 def _quoted(text: str) -> str:

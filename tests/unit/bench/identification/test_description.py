@@ -78,6 +78,22 @@ def test_a_clock_of_its_own_is_given_to_the_columns_behind_it(tmp_path: Path, mo
     assert found.problem == ""
 
 
+def test_a_column_that_is_left_out_slows_nobody_down(tmp_path: Path, model: FlatModel) -> None:
+    """The bench writes a slow column that the deck has no sensor for: what is used keeps its rate."""
+    rows = table()
+    lines = ["t_s,theta_deg,torque_N*m,t2_s,strain"]
+    for k, row in enumerate(rows):
+        slow = f"{rows[4 * k, 0]:.6f},0.1" if 4 * k < len(rows) else ","
+        lines.append(",".join(f"{value:.6f}" for value in row) + f",{slow}")
+    (tmp_path / "a.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    found = describe_records(tmp_path, model)
+    assert [c.head for c in found.undecided] == ["strain"]
+    assert found.problem == ""
+    assert found.records is not None
+    assert sum(len(record.trace.time) for record in found.records.records) == len(rows)
+    assert f"# needs resample_Hz = {0.25 / STEP:g} at the top" in found.mapping()
+
+
 def test_a_clock_of_another_unit_is_left_to_be_decided(tmp_path: Path, model: FlatModel) -> None:
     """A mapping has one unit of time: with a clock in milliseconds it would be read a thousandfold wrong."""
     rows = table()
