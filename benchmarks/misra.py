@@ -15,7 +15,8 @@ from collections import Counter
 from pathlib import Path
 
 from benchmarks._tools import run_tool
-from benchmarks.targets import DECK, models, replaced
+from benchmarks._generated import DECK, models
+from benchmarks.targets import replaced
 from nlsdesign.export import export_c
 from nlsdesign.export.c.writer import CSource
 

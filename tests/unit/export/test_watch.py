@@ -20,7 +20,7 @@ from nlsdesign.foundation.errors import ExportError
 from nlsdesign.regeneration import read_watch, watch_plan
 from tests.compiling import compile_program
 from tests.watched import joint_deck
-from tests.watching import as_step
+from tests.watching import as_step, quick, readings
 
 DECK = "austin2015_figure_consistent"
 
@@ -39,27 +39,6 @@ def joint(tmp_path_factory):
     file = tmp_path_factory.mktemp("deck") / "joint.toml"
     file.write_text(joint_deck(), encoding="utf-8")
     return plan_of(file, 2e-3)
-
-
-def quick(plan):
-    """Judge every five means, and at once."""
-    return replace(
-        plan, between=5.0 * LENGTH * plan.model.sample_time, settling=plan.model.sample_time, least=4.0
-    )
-
-
-def readings(plan, count):
-    """Angles that swing, a current that goes with them, and two samples that are no number."""
-    time = np.arange(count) * plan.model.sample_time
-    swing = 0.5 * np.sin(9.0 * time) + 0.1 * np.sin(31.0 * time)
-    columns = {
-        "motor.current": 3.0 * swing,
-        "ammeter.reading": 0.6 * swing,
-        "load_encoder.reading": 0.95 * swing,
-    }
-    table = np.column_stack([columns.get(v.name, swing) for v in plan.model.inputs]).astype(np.float32)
-    table[count // 2 : count // 2 + 2, 0] = np.nan
-    return table.astype(float)
 
 
 @pytest.mark.long_cases("published-float")
