@@ -14,8 +14,8 @@ import tempfile
 from collections import Counter
 from pathlib import Path
 
-from benchmarks._tools import run_tool
 from benchmarks._generated import DECK, models
+from benchmarks._tools import run_tool
 from benchmarks.targets import replaced
 from nlsdesign.export import export_c
 from nlsdesign.export.c.writer import CSource
