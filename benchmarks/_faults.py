@@ -1,7 +1,7 @@
 """Generated steps beside their machine while readings and commands fail: how soon a fault is forgotten.
 
-Two machines with one step each are used alike, and one of them meets the faults. The C runs on this machine, in the
-number type that is asked for; the processors of `benchmarks.targets` give the same bits.
+Two machines with one step each are used alike, and one of them meets the faults. The C runs on this machine,
+in the number type that is asked for; the processors of `benchmarks.targets` give the same bits.
 """
 
 from __future__ import annotations
@@ -26,31 +26,33 @@ SETTLED, WATCHED = 300, 200
 """Samples after a fault from which it should be forgotten, and how many are looked at then."""
 QUANTUM: Final = 0.767e-3
 STOP: Final = 1.5
-"""Angle in rad at which the frame stops the machine, as the deck declares its readings; the blow takes all speed."""
+"""Angle in rad at which the frame stops the machine, as the deck declares; the blow takes all speed."""
 
-Fault = Callable[[np.random.Generator, int], tuple[int, Callable[[int, float], float]]]
-"""From chance and sample to a length in samples, and from the sample in the fault and a good value to a bad one."""
+Change = Callable[[float], float]
+"""From a good value to what is read or commanded."""
+REPORTED: Final = 8
+"""First bit of a monitor's word that names a change."""
 
 
-def _value(draw: np.random.Generator, _: int) -> tuple[int, Callable[[int, float], float]]:
+def _value(draw: np.random.Generator) -> tuple[int, Change]:
     bad = math.copysign(10.0 ** draw.uniform(-3.0, 38.0), draw.uniform(-1.0, 1.0))
-    return 1, lambda k, good: good + bad
+    return 1, lambda good: good + bad
 
 
-def _not_a_number(draw: np.random.Generator, _: int) -> tuple[int, Callable[[int, float], float]]:
+def _not_a_number(draw: np.random.Generator) -> tuple[int, Change]:
     bad = float(draw.choice([math.nan, math.inf, -math.inf]))
-    return int(draw.integers(1, 151)), lambda k, good: bad
+    return int(draw.integers(1, 151)), lambda good: bad
 
 
-def _jump(draw: np.random.Generator, _: int) -> tuple[int, Callable[[int, float], float]]:
+def _jump(draw: np.random.Generator) -> tuple[int, Change]:
     size = draw.uniform(-3.0, 3.0)
-    return int(draw.integers(1, 41)), lambda k, good: good + size
+    return int(draw.integers(1, 41)), lambda good: good + size
 
 
-def _frozen(draw: np.random.Generator, _: int) -> tuple[int, Callable[[int, float], float]]:
+def _frozen(draw: np.random.Generator) -> tuple[int, Change]:
     stands: list[float] = []
 
-    def bad(k: int, good: float) -> float:
+    def bad(good: float) -> float:
         stands.append(good)
         return stands[0]
 
@@ -100,14 +102,15 @@ class Twin:
         self._inputs = [v.name for v in model.inputs]
         names = [v.name for v in model.outputs]
         self._current = names.index("motor.current") if "motor.current" in names else None
-        self._torque = (
-            names.index("spring.torque") if "spring.torque" in names and self._current is None else None
-        )
+        self._torque = names.index("spring.torque") if "spring.torque" in names else None
         self._state, self._acting = machine.start, 0.0
         self.step_finite, self.word = True, 0
 
-    def sample(self, k: int, reading: Callable[[float], float], command: Callable[[float], float]) -> float:
-        """Go on by one sample; return the torque that is judged: of an observer its estimate, else the machine's."""
+    def sample(self, k: int, reading: Change, command: Change) -> float:
+        """Go on by one sample; return what is judged.
+
+        Of an observer that is its estimate, of a loop the machine's torque, of a monitor that it reports.
+        """
         time = 1e-3 * k
         if self._current is None:
             self._acting = 8.0 * math.sin(8.2 * time) + 4.0 * math.sin(2.3 * time + 1.0)
@@ -120,10 +123,11 @@ class Twin:
         }  # fmt: skip
         outputs, self.word = self._step([given[name] for name in self._inputs])
         self.step_finite = bool(np.isfinite(outputs).all())
+        self._state = following
         if self._current is not None:
             self._acting = float(outputs[self._current])
-        self._state = following
-        return float(outputs[self._torque]) if self._torque is not None else torque
+            return torque
+        return float(outputs[self._torque]) if self._torque is not None else float(self.word >> REPORTED > 0)
 
 
 @dataclass(frozen=True)
@@ -146,10 +150,7 @@ def forgotten(source: CSource, plant: FlatModel, faults: int, *, seed: int = 1) 
     """Run a step with faults drawn by chance beside one without."""
     machine, draw, model = Machine(plant), np.random.default_rng(seed), source.model
     good, failing = (Twin(machine, CompiledStep(source), model) for _ in range(2))
-    commanded = [
-        v.name for v in model.inputs if v.name.startswith(("motor.current", "spring.torque.desired"))
-    ]
-    kinds = [(kind, True) for kind in READINGS] + [(kind, False) for kind in COMMANDS if commanded]
+    kinds = [(kind, True) for kind in READINGS] + [(kind, False) for kind in COMMANDS]
 
     def same(value: float) -> float:
         return value
@@ -157,10 +158,10 @@ def forgotten(source: CSource, plant: FlatModel, faults: int, *, seed: int = 1) 
     k, worst, beyond, unflagged, not_finite = 0, 0.0, 0, 0, 0
     for number in range(faults):
         kind, of_reading = kinds[number % len(kinds)]
-        length, bad = kind(draw, k)
+        length, bad = kind(draw)
         pause, flagged, apart = 1000 if number == 0 else int(draw.integers(1, 50)), False, 0.0
         for j in range(-pause, length + SETTLED + WATCHED):
-            faulty = (lambda value, j=j: bad(j, value)) if 0 <= j < length else same
+            faulty = bad if 0 <= j < length else same
             readings, commands = (faulty, same) if of_reading else (same, faulty)
             true, seen = good.sample(k, same, same), failing.sample(k, readings, commands)
             flagged |= j >= 0 and failing.word != 0

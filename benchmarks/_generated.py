@@ -100,10 +100,11 @@ def supervised(model: FlatModel, folder: Path, real: str) -> CSource:
     return replace(source, name="supervised", header=folder / "supervised.h", source=folder / "supervised.c")
 
 
-def written(name: str, model: FlatModel, folder: Path, real: str) -> CSource:
-    """Write the files of a kind."""
+def written(name: str, model: FlatModel, folder: Path, real: str, *, quick_monitor: bool = True) -> CSource:
+    """Write the files of a kind; a quick monitor judges within the vectors of a self-test."""
     if name == MONITOR:
-        return as_step(export_watch(quick(monitor_plan()), folder, real=real))
+        plan = quick(monitor_plan()) if quick_monitor else monitor_plan()
+        return as_step(export_watch(plan, folder, real=real))
     if name == SUPERVISED:
         return supervised(model, folder, real)
     return export_c(model, folder, real=real, name="step")
