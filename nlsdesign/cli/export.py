@@ -49,7 +49,16 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     if name == WATCH:
         return [*c_names(name), *c_names(f"{name}_residuals")]
     further = (
-        (".hpp", "_supervisor.h", "_example_posix.c", "_example_cortex_m.c", ".mk")
+        (
+            ".hpp",
+            "_supervisor.h",
+            "_example_posix.c",
+            "_example_cortex_m.c",
+            "_link.h",
+            "_example_link.c",
+            "_play.py",
+            ".mk",
+        )
         if given["examples"]
         else ()
     )

@@ -22,8 +22,7 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
-from .block_code import half_byte_sums
-from .c_text import Real, comment, identifier, origin_lines, stamped
+from .c_text import Real, comment, half_byte_sums, identifier, origin_lines, stamped
 from .controller_code import export_c
 from .writer import CSource
 
