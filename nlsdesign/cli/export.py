@@ -306,6 +306,24 @@ def export_for_mujoco(deck_name: str, smooth: bool, out: Path, as_json: bool) ->
     show_written(as_json, (f"next: python {written.module}",), written.files)
 
 
+@export.command(
+    "urdf",
+    epilog=examples(
+        "nlsdesign export urdf --deck austin2015_figure_consistent",
+        "nlsdesign export urdf --deck my.toml --out robot/joint.urdf",
+    ),
+)
+@deck_option
+@out_file_option("out/actuator.urdf", "File to write, NAME.urdf.", ending=".urdf")
+@json_option
+def export_description_of_robot(deck_name: str, out: Path, as_json: bool) -> None:
+    """Write inertias, limits and transmissions as URDF. Springs and friction have no place in it."""
+    from ..export import export_urdf
+    from ..model import flatten
+
+    show_written(as_json, (), [export_urdf(flatten(machine_of(deck_name)), out)])
+
+
 TOGETHER, APART, UNREADABLE = 0, 1, 2
 """Exit status."""
 

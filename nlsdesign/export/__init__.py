@@ -31,6 +31,7 @@ from .fmi.fmu_documentation import Authorship
 from .fmi.reference_results import write_reference
 from .modelica.modelica_model import export_modelica
 from .mujoco.actuator_model import export_mujoco
+from .mujoco.urdf_model import export_urdf
 
 __all__ = [
     "ALL_PLATFORMS",
@@ -61,6 +62,7 @@ __all__ = [
     "export_fmu",
     "export_modelica",
     "export_mujoco",
+    "export_urdf",
     "export_watch",
     "loadable_model",
     "measure_on_target",
