@@ -1,11 +1,12 @@
-"""One leg with three series elastic joints walks in MuJoCo: from the gait of people to the currents of motors.
+"""One leg with three series elastic joints walks in MuJoCo: from the gait of people to motor currents.
 
     python leg.py [STRIDES]
 
-Hip, knee and ankle have the published actuator each, on a frame that holds the hip. Every millisecond the generated
-step of observer and torque controller, compiled as it goes onto a controller, reads the counts of a deflection and
-gives a current. The torques of the gait are those of a thirtieth of a person of 75 kg. Ground and the rest of the
-body act as the torques that are missing then: what the motion of this leg needs less what the gait's muscles give.
+Hip, knee and ankle have the published actuator each, on a frame that holds the hip. Every millisecond the
+generated step of observer and torque controller, compiled as it goes onto a controller, reads the counts of a
+deflection and gives a current. The torques of the gait are those of a thirtieth of a person of 75 kg. Ground
+and the rest of the body act as the torques that are missing then: what the motion of this leg needs less what
+the muscles of the gait give.
 """
 
 import importlib.util
@@ -38,7 +39,7 @@ class Gait(NamedTuple):
 
 
 def gait() -> Gait:
-    """Return a stride of hip, knee and ankle at 1 kHz, shape (samples, joints); torques of this leg's share."""
+    """Return a stride at 1 kHz, shape (samples, joints), with the torques of this leg's share."""
     cycles = []
     for joint in JOINTS:
         task = nls.design.walking_task(joint, body_mass=SHARE * BODY_MASS)

@@ -47,7 +47,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
     name = "torque_loop" if given["what"] == BOTH else given["what"]
     if name == WATCH:
-        return [*c_names(name), *c_names(f"{name}_residuals")]
+        return [*c_names(name), *c_names(f"{name}_residuals"), f"{name}.a2l"]
     further = (
         (
             ".hpp",

@@ -3,7 +3,7 @@
 Presentation and commands may import it; it reads models, and designs nothing.
 """
 
-from .c.asap2 import write_a2l
+from .c.asap2 import write_a2l, write_watch_a2l
 from .c.block_code import export_c_with_blocks
 from .c.block_files import read_parameter_block, write_parameter_block
 from .c.block_layout import ParameterBlock
@@ -79,4 +79,5 @@ __all__ = [
     "write_parameter_block",
     "write_reference",
     "write_ssp",
+    "write_watch_a2l",
 ]

@@ -23,7 +23,7 @@ def test_the_leg_walks_as_its_page_says(root: Path, tmp_path: Path) -> None:
     page = (root / "examples" / "leg" / "README.md").read_text(encoding="utf-8")
     stride = leg.gait()
     for i, (joint, numbers) in enumerate(results.items()):
-        # A third of a per cent of 5 N·m would be perfect; a loop that is not stable errs by newtons.
+        # A loop that is not stable errs by newtons.
         assert numbers["torque error, mN·m rms"] < 50.0
         assert numbers["angle error, deg rms"] < 1.5
         assert numbers["largest current, A"] < 20.0

@@ -11,7 +11,7 @@ import nlsdesign as nls
 from nlsdesign.export import export_urdf
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.errors import ExportError
-from tests.command_line import Run, run
+from tests.command_line import Run
 
 mujoco = pytest.importorskip("mujoco")
 
@@ -20,9 +20,7 @@ def plant(deck: str) -> nls.FlatModel:
     return nls.flatten(nls.declare(nls.load_deck(deck)))
 
 
-@pytest.mark.parametrize(
-    "deck", ["austin2015_figure_consistent", "spring_beside_drive", "dfki_pendulum"]
-)
+@pytest.mark.parametrize("deck", ["austin2015_figure_consistent", "spring_beside_drive", "dfki_pendulum"])
 def test_another_reader_finds_the_inertias_of_the_deck(deck: str, tmp_path: Path) -> None:
     model = plant(deck)
     seen = mujoco.MjModel.from_xml_path(str(export_urdf(model, tmp_path / "joint.urdf")))

@@ -13,7 +13,7 @@ import nlsdesign as nls
 from nlsdesign.components import smoothed
 from nlsdesign.export import CORTEX_M4F, export_watch, measure_on_target, read_watch_record
 from nlsdesign.export.c.c_text import Real
-from nlsdesign.export.c.watch_code import LENGTH, WatchTwin, drawn_rows
+from nlsdesign.export.c.watch_code import LENGTH, MISFIT, WatchTwin, drawn_rows
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.target_run import missing_emulator
 from nlsdesign.foundation.errors import ExportError
@@ -104,6 +104,21 @@ def test_rows_that_follow_the_first_change_of_each_block_say_so(joint):
     first = [1 << plan.first_bit(i) for i in range(2)]
     assert words[-1] & ~4 == 1 | first[0] | first[1]
     assert words[0] & 3 == 2
+
+
+def test_more_left_than_any_change_explains_is_a_word_of_its_own(published):
+    """Efforts that go with nothing: no change is sure, and a monitor that asks for changes alone is silent."""
+    plan = quick(published)
+    (block,) = plan.blocks
+    for share, expected in ((0.5, 0), (2.0, 1 | MISFIT)):
+        twin, draw = WatchTwin(plan), np.random.default_rng(5)
+        word = 0
+        for _ in range(60):
+            drawn = draw.normal(size=len(block.changes))
+            left = share * block.usual_load * draw.normal()
+            for _ in range(LENGTH):
+                word = twin.take([[*(1e-3 * drawn), left, 1.0, 1.0]])
+        assert word & ~4 == expected
 
 
 def test_a_mean_counts_where_those_on_both_sides_go_the_same_way(published):
