@@ -107,7 +107,7 @@ def test_rows_that_follow_the_first_change_of_each_block_say_so(joint):
 
 
 def test_more_left_than_any_change_explains_is_a_word_of_its_own(published):
-    """Efforts that go with nothing: no change is sure, and a monitor that asks for changes alone is silent."""
+    """Efforts that go with nothing: no change is sure, and no bit of a change would be set."""
     plan = quick(published)
     (block,) = plan.blocks
     for share, expected in ((0.5, 0), (2.0, 1 | MISFIT)):
