@@ -60,7 +60,8 @@ class Row(NamedTuple):
         return (
             f"| {self.name} | {self.processor.name} | {self.real} | {np.median(run.instructions):,.0f} | "
             f"{run.instructions.max():,} | {self.cost.flash:,} | {self.cost.memory:,} | "
-            f"{run.stack.max():,} | {'passes' if self.passes else 'FAILS'} | {self.faults.cells() if self.faults else '| | | |'} |"
+            f"{run.stack.max():,} | {'passes' if self.passes else 'FAILS'} | "
+            f"{self.faults.cells() if self.faults else '| | | |'} |"
         )
 
 
