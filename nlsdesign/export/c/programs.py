@@ -145,6 +145,7 @@ def write_examples(source: CSource) -> list[Path]:
         ],
         "nanoseconds": str(round(1e9 * float(source.model.sample_time or 0.0))),
         "microseconds": str(round(1e6 * float(source.model.sample_time or 0.0))),
+        "unit": "4" if source.real is Real.FLOAT else "8",  # bits of __ARM_FP, Arm C Language Extensions
         **_link_values(source),
     }
     files = {
