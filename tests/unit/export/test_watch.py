@@ -59,7 +59,7 @@ def test_the_c_has_the_bits_of_its_twin(machine, real, request, tmp_path):
         given, status = residuals(row)
         expected.append(twin.take([part.tolist() for part in np.split(given, ends)], status == 0))
     assert words == expected
-    assert {0, 2} <= {word & 3 for word in words}  # judged, after too little had been seen
+    assert {2} < {word & 3 for word in words}  # judged, after too little had been seen
     memory, record = bytes(whole._state), twin.record.tobytes()
     at = memory.index(record[:8])
     assert memory[at : at + len(record)] == record
