@@ -9,7 +9,7 @@ and the rest of the body act as the torques that are missing then: what the moti
 the muscles of the gait give.
 """
 
-import importlib.util
+import importlib
 import sys
 import tempfile
 from pathlib import Path
@@ -49,7 +49,7 @@ def gait() -> Gait:
 
 
 def robot(name: str, inner: int) -> str:
-    """Return the MJCF: each joint is the load of an actuator, its rotor turns beside it on the link before."""
+    """Return the MJCF: each joint is the load of an actuator, its rotor turns beside it."""
     bodies, ends = "", ""
     start = "0 0 0"
     for joint, length, mass in zip(JOINTS, LENGTHS, MASSES, strict=True):
@@ -63,7 +63,8 @@ def robot(name: str, inner: int) -> str:
   <geom type="capsule" fromto="0 0 0 {end}" size="0.015" mass="{mass}" contype="0" conaffinity="0"/>"""
         ends, start = f"{ends}</body>", end
     drives = "".join(
-        f"""<general name="{joint}_motor.current" joint="{joint}_motor" gear="4" gainprm="0.055" ctrlrange="-20 20"/>
+        f"""<general name="{joint}_motor.current" joint="{joint}_motor" gear="4" gainprm="0.055"
+ ctrlrange="-20 20"/>
 <general name="{joint}_load.torque" joint="{joint}_load"/>
 <general name="{joint}_inner_states" joint="{joint}_motor" dyntype="user" actdim="{inner}" gainprm="0"/>"""
         for joint in JOINTS
@@ -92,7 +93,7 @@ def rotor_inertia() -> float:
 
 
 def missing_torques(model: mujoco.MjModel, stride: Gait, places: list[int]) -> np.ndarray:
-    """Return what ground and body give at each sample: what this motion needs less what the muscles give."""
+    """Return what ground and body give at each sample: this motion's need less the muscles."""
     data, needed = mujoco.MjData(model), np.zeros_like(stride.torque)
     rotors = [model.joint(f"{joint}_motor").dofadr[0] for joint in JOINTS]
     for k in range(len(needed)):
@@ -114,11 +115,8 @@ def walk(strides: int, folder: Path) -> dict[str, dict[str, float]]:
     source = nls.export_c(both, folder / "c", real="float", name="torque_loop")
     steps = {joint: CompiledStep(source) for joint in JOINTS}
     written = nls.export.export_mujoco(machine(), folder / "mujoco")
-    spec = importlib.util.spec_from_file_location(written.name, written.module)
-    assert spec is not None
-    assert spec.loader is not None
-    actuator = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(actuator)
+    sys.path.insert(0, str(written.module.parent))
+    actuator = importlib.import_module(written.name)
     actuator.load_plugin()
     model = mujoco.MjModel.from_xml_string(robot(written.name, len(actuator.INNER)))
     data, stride = mujoco.MjData(model), gait()

@@ -103,7 +103,7 @@ def write_watch_a2l(
     Returns
     -------
     Path
-        That of the description.
+        Of the file.
 
     Raises
     ------
@@ -114,21 +114,21 @@ def write_watch_a2l(
     plan, name = source.plan, source.name
     of_deck = plan.model.origin.deck if plan.model.origin else plan.model.name
     about = _File(name, f"monitor of deck {of_deck}", " ".join(f"{w:08x}" for w in plan.digest))
-    write_text(Path(path), about.text(["1"], list(_watched(source, symbol))))
+    write_text(Path(path), about.text(["1"], list(watched_entries(source, symbol))))
     return Path(path)
 
 
-def _watched(source: WatchSource, symbol: Symbol) -> Iterator[str]:
+def watched_entries(source: WatchSource, symbol: Symbol) -> Iterator[str]:
     """Yield the measurements of the record, which stands first in the state of a monitor."""
     plan, layout = source.plan, source.plan.layout(source.real)
     kind, most = _kind(source.real), repr(source.real.largest)
     fields, width = layout.fields, 4 if source.real is Real.FLOAT else 8
     assert fields is not None
 
-    def row(name: str, text: str, at: int, word: bool = False, count: int = 1) -> Iterator[str]:
+    def row(name: str, text: str, at: int, is_number: bool = True, count: int = 1) -> Iterator[str]:
         yield f"    /begin MEASUREMENT {_identifier(f'{source.name}.{name}')}"
-        limits = "0 4294967295" if word else f"-{most} {most}"
-        yield f"      {_string(text)} {'ULONG' if word else kind} {_method('1')} 0 0 {limits}"
+        limits = f"-{most} {most}" if is_number else "0 4294967295"
+        yield f"      {_string(text)} {kind if is_number else 'ULONG'} {_method('1')} 0 0 {limits}"
         yield f"      ECU_ADDRESS {_address(symbol, at)}"
         if count > 1:
             yield f"      MATRIX_DIM {count}"
@@ -136,7 +136,7 @@ def _watched(source: WatchSource, symbol: Symbol) -> Iterator[str]:
         yield "    /end MEASUREMENT"
 
     for name in ("magic", "version", "size", "judged", "word", "checksum"):
-        yield from row(name, f"{name} of the record", int(fields[name][1]), word=True)
+        yield from row(name, f"{name} of the record", int(fields[name][1]), is_number=False)
     moments = int(layout["recent"].base.itemsize)
     for i, block in enumerate(plan.blocks):
         for k, change in enumerate(block.changes):

@@ -146,7 +146,7 @@ def write_examples(source: CSource) -> list[Path]:
         "nanoseconds": str(round(1e9 * float(source.model.sample_time or 0.0))),
         "microseconds": str(round(1e6 * float(source.model.sample_time or 0.0))),
         "unit": "4" if source.real is Real.FLOAT else "8",  # bits of __ARM_FP, Arm C Language Extensions
-        **_link_values(source),
+        **link_values(source),
     }
     files = {
         f"{name}.hpp": "wrapper.hpp",
@@ -164,7 +164,7 @@ def write_examples(source: CSource) -> list[Path]:
     return list(texts)
 
 
-def _link_values(source: CSource) -> dict[str, str | list[str]]:
+def link_values(source: CSource) -> dict[str, str | list[str]]:
     """Return what the frames between a board and a desk hold."""
     model, paths = source.model, source.writer.paths
     inputs, outputs = ([v.name for v in group] for group in (model.inputs, model.outputs))

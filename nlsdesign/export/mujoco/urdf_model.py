@@ -74,14 +74,14 @@ def export_urdf(model: FlatModel, path: str | Path) -> Path:
         f"<!-- {about} -->",
         f"<robot name={quoteattr(model.name)}>",
         f'  <link name="{_BASE}"/>',
-        *(f"  {line}" for body in model.bodies for line in _body(model, body)),
+        *(f"  {line}" for body in model.bodies for line in body_lines(model, body)),
         "</robot>",
     ]
     write_text(Path(path), "\n".join(lines) + "\n")
     return Path(path)
 
 
-def _body(model: FlatModel, body: MovingBody) -> Iterator[str]:
+def body_lines(model: FlatModel, body: MovingBody) -> Iterator[str]:
     """Yield link, joint and transmission of one body."""
     numbers = model.values | model.evaluate(list(model.start(model.states)))
     inertia, turning = numbers[str(body.inertia)], same_dimension(body.domain.effort_unit, "N*m")
