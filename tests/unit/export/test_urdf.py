@@ -11,7 +11,9 @@ import nlsdesign as nls
 from nlsdesign.export import export_urdf
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.errors import ExportError
-from tests.command_line import Run
+from tests.command_line import Run, run
+
+__all__ = ["run"]
 
 mujoco = pytest.importorskip("mujoco")
 
