@@ -9,7 +9,7 @@ import argparse
 import tempfile
 from pathlib import Path
 
-from benchmarks.targets import models
+from benchmarks._generated import models
 from nlsdesign.export import export_c
 from nlsdesign.export.compilation.proof import StepProof, prove_step
 

@@ -1,4 +1,4 @@
-"""Instructions, flash, memory and stack on Cortex-M: ``python -m benchmarks.targets``.
+"""Cost on Cortex-M, self-tests and faults of every kind of generated code: ``python -m benchmarks.targets``.
 
 Writes the tables of ``docs/targets.md`` anew; needs ``qemu-system-arm``. With ``--check`` nothing is written,
 and the exit status says whether the goals are met.
@@ -9,25 +9,21 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-import nlsdesign as nls
-from nlsdesign.export import CORTEX_M4F, PROCESSORS, Processor, export_c, measure_on_target
+from benchmarks._faults import Forgotten, forgotten
+from benchmarks._generated import every_kind, machine, self_test_passes, written
+from nlsdesign.export import CORTEX_M4F, PROCESSORS, CSource, Processor, export_c, measure_on_target
 from nlsdesign.export.compilation.target_run import TargetMeasurement
-from nlsdesign.feedback.control import joined
-from nlsdesign.feedback.observer import (
-    design_corrected_observer,
-    design_observer_with_details,
-)
 from nlsdesign.model import FlatModel, Variable
 from tests.unguarded import unguarded
 
-DECK = "austin2015_figure_consistent"
 PAGE = Path(__file__).parents[1] / "docs" / "targets.md"
 BEGIN, END = "<!-- begin: {} -->", "<!-- end: {} -->"
 FUNCTIONS = ("exp", "expm1", "log", "log1p", "tanh", "erf", "sin", "atan", "sqrt")
@@ -47,56 +43,65 @@ GOALS = {
 }  # fmt: skip
 
 
-def models() -> dict[str, FlatModel]:
-    """What runs on the controller, from the bundled deck."""
-    plant = nls.flatten(nls.declare(nls.load_deck(DECK)))
-    cascade = design_observer_with_details(plant).model
-    corrected = design_corrected_observer(plant).model
-    controller = nls.torque_controller(plant, law=nls.control.PidTorque())
-    scheduled = nls.torque_controller(plant, law=nls.control.ScheduledTorque())
-    return {
-        "cascade observer": cascade,
-        "controller": controller,
-        "scheduled controller": scheduled,
-        "cascade observer and controller": joined(cascade, controller),
-        "cascade observer and scheduled controller": joined(cascade, scheduled),
-        "corrected observer": corrected,
-        "corrected observer and controller": joined(corrected, controller),
-        "corrected observer and scheduled controller": joined(corrected, scheduled),
-    }
+class Row(NamedTuple):
+    """What was measured of a kind of code in a number type on a processor."""
+
+    name: str
+    real: str
+    processor: Processor
+    cost: TargetMeasurement
+    passes: bool  # its self-test
+    faults: Forgotten | None = None
+
+    def cells(self) -> str:
+        """Return it as a row of the table."""
+        run = self.cost.run
+        assert run is not None
+        return (
+            f"| {self.name} | {self.processor.name} | {self.real} | {np.median(run.instructions):,.0f} | "
+            f"{run.instructions.max():,} | {self.cost.flash:,} | {self.cost.memory:,} | "
+            f"{run.stack.max():,} | {'passes' if self.passes else 'FAILS'} | "
+            f"{self.faults.cells() if self.faults else '| | | |'} |"
+        )
+
+
+def costs_of(source: CSource, processor: Processor) -> TargetMeasurement:
+    """Compile and run; what differs from this machine ends the benchmark."""
+    cost = measure_on_target(source, processor)
+    if cost.run is None:
+        raise SystemExit(f"not measured: {cost.reason}")
+    if not cost.run.same:
+        raise SystemExit(f"{source.name} in {source.real}: {processor.name} and this machine differ in bits")
+    return cost
 
 
 def measured(model: FlatModel, real: str, processor: Processor) -> TargetMeasurement:
     """Export, compile, run."""
     with tempfile.TemporaryDirectory() as folder:
-        cost = measure_on_target(export_c(model, folder, real=real, name="step"), processor)
-    if cost.run is None:
-        raise SystemExit(f"not measured: {cost.reason}")
-    if not cost.run.same:
-        raise SystemExit(f"{model.name} in {real}: {processor.name} and this machine differ in their bits")
-    return cost
+        return costs_of(export_c(model, folder, real=real, name="step"), processor)
 
 
-def cost_rows(chosen: dict[str, FlatModel]) -> Iterator[tuple[str, str, Processor, TargetMeasurement]]:
+def rows(chosen: dict[str, FlatModel], faults: int) -> Iterator[Row]:
+    """Measure every kind; faults are run in each number type once, for both processors give the same bits."""
+    plant = machine()
     for name, model in chosen.items():
-        for processor in PROCESSORS:
-            for real in ("float", "double"):
-                yield name, real, processor, measured(model, real, processor)
+        for real in ("float", "double"):
+            with tempfile.TemporaryDirectory() as folder:
+                source = written(name, model, Path(folder), real)
+                used = written(name, model, Path(folder) / "used", real, quick_monitor=False)
+                after = forgotten(used, plant, faults) if faults else None
+                passes = self_test_passes(source)
+                for processor in PROCESSORS:
+                    row = Row(name, real, processor, costs_of(source, processor), passes, after)
+                    print(row.cells(), flush=True)
+                    yield row
 
 
-def costs(rows: list[tuple[str, str, Processor, TargetMeasurement]]) -> list[str]:
-    lines = [
-        "| | processor | number type | instructions, usual | at most | flash, B | memory, B | stack, B |",
-        "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: |",
-    ]
-    for name, real, processor, cost in rows:
-        run = cost.run
-        assert run is not None
-        lines.append(
-            f"| {name} | {processor.name} | {real} | {np.median(run.instructions):,.0f} | "
-            f"{run.instructions.max():,} | {cost.flash:,} | {cost.memory:,} | {run.stack.max():,} |"
-        )
-    return lines
+HEAD = [
+    "| | processor | number type | instructions, usual | at most | flash, B | memory, B | stack, B "
+    "| self-test | faults | left after 0.3 s, % | beyond 1 % | of these unflagged | samples not finite |",
+    "| --- | --- | --- | ---: | ---: | ---: | ---: | ---: | --- | ---: | ---: | ---: | ---: | ---: |",
+]
 
 
 def parts(cascade: FlatModel) -> list[str]:
@@ -151,10 +156,14 @@ def _instructions(model: FlatModel, real: str, processor: Processor) -> np.ndarr
     return run.instructions
 
 
-def missed(rows: list[tuple[str, str, Processor, TargetMeasurement]]) -> list[str]:
+def missed(measured: Iterable[Row]) -> list[str]:
     """Goals that are not met, each as a sentence."""
     sentences = []
-    for name, real, processor, cost in rows:
+    for name, real, processor, cost, passes, faults in measured:
+        if not passes:
+            sentences.append(f"{name} in {real}: the self-test fails")
+        if faults is not None and (faults.unflagged or faults.not_finite):
+            sentences.append(f"{name} in {real}: a fault is neither forgotten after 0.3 s nor flagged")
         goal = GOALS.get(name)
         if goal is None or real != "float" or processor is not CORTEX_M4F or cost.run is None:
             continue
@@ -163,7 +172,7 @@ def missed(rows: list[tuple[str, str, Processor, TargetMeasurement]]) -> list[st
             sentences.append(f"{name}: {usual:.0f} instructions, the goal is {goal.instructions}")
         if cost.flash > goal.flash:
             sentences.append(f"{name}: {cost.flash} B of flash, the goal is {goal.flash}")
-    return sentences
+    return list(dict.fromkeys(sentences))
 
 
 def replaced(page: str, tables: dict[str, list[str]]) -> str:
@@ -182,15 +191,15 @@ def main() -> int:
     """Measure, and write or check."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--check", action="store_true", help="write nothing")
+    parser.add_argument("--faults", type=int, default=60, help="for each kind and number type; 0 for none")
     given = parser.parse_args()
-    chosen = models()
-    rows = list(cost_rows(chosen))
-    tables = {"costs": costs(rows), "parts": parts(chosen["cascade observer"]), "functions": functions()}
-    for lines in tables.values():
-        print("\n".join(lines), end="\n\n")
+    chosen = every_kind()
+    table = list(rows(chosen, given.faults))
+    lines = [*HEAD, *(row.cells() for row in table)]
+    tables = {"costs": lines, "parts": parts(chosen["cascade observer"]), "functions": functions()}
     if not given.check:
         PAGE.write_text(replaced(PAGE.read_text(encoding="utf8"), tables), encoding="utf8")
-    sentences = missed(rows)
+    sentences = missed(table)
     print("\n".join(sentences) or "all goals are met")
     return int(bool(sentences))
 

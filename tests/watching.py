@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
-from nlsdesign.export import CSource
-from nlsdesign.export.c.watch_code import WatchSource
+import numpy as np
+
+from nlsdesign.export import CSource, WatchPlan
+from nlsdesign.export.c.watch_code import LENGTH, WatchSource
+from nlsdesign.foundation.arrays import Array
 
 HEADER = """#ifndef WATCHED_H
 #define WATCHED_H
@@ -58,3 +62,24 @@ def as_step(source: WatchSource) -> CSource:
         (folder / file).write_text(text.format(name=source.name), encoding="utf-8")
     header, code = (Path(folder) / file for file in files)
     return CSource("watched", source.plan.model, source.real, header, code, source.selftest)
+
+
+def quick(plan: WatchPlan) -> WatchPlan:
+    """Return a monitor that judges every five means, and at once."""
+    return replace(
+        plan, between=5.0 * LENGTH * plan.model.sample_time, settling=plan.model.sample_time, least=4.0
+    )
+
+
+def readings(plan: WatchPlan, count: int) -> Array:
+    """Return angles that swing, a current that goes with them, and two samples that are no number."""
+    time = np.arange(count) * plan.model.sample_time
+    swing = 0.5 * np.sin(9.0 * time) + 0.1 * np.sin(31.0 * time)
+    columns = {
+        "motor.current": 3.0 * swing,
+        "ammeter.reading": 0.6 * swing,
+        "load_encoder.reading": 0.95 * swing,
+    }
+    table = np.column_stack([columns.get(v.name, swing) for v in plan.model.inputs]).astype(np.float32)
+    table[count // 2 : count // 2 + 2, 0] = np.nan
+    return table.astype(float)

@@ -47,9 +47,18 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     """Return the names of the files that the options ask for."""
     name = "torque_loop" if given["what"] == BOTH else given["what"]
     if name == WATCH:
-        return [*c_names(name), *c_names(f"{name}_residuals")]
+        return [*c_names(name), *c_names(f"{name}_residuals"), f"{name}.a2l"]
     further = (
-        (".hpp", "_supervisor.h", "_example_posix.c", "_example_cortex_m.c", ".mk")
+        (
+            ".hpp",
+            "_supervisor.h",
+            "_example_posix.c",
+            "_example_cortex_m.c",
+            "_link.h",
+            "_example_link.c",
+            "_play.py",
+            ".mk",
+        )
         if given["examples"]
         else ()
     )
@@ -295,6 +304,24 @@ def export_for_mujoco(deck_name: str, smooth: bool, out: Path, as_json: bool) ->
     assembly = machine_of(deck_name)
     written = export_mujoco(flatten(smoothed(assembly) if smooth else assembly), out)
     show_written(as_json, (f"next: python {written.module}",), written.files)
+
+
+@export.command(
+    "urdf",
+    epilog=examples(
+        "nlsdesign export urdf --deck austin2015_figure_consistent",
+        "nlsdesign export urdf --deck my.toml --out robot/joint.urdf",
+    ),
+)
+@deck_option
+@out_file_option("out/actuator.urdf", "File to write, NAME.urdf.", ending=".urdf")
+@json_option
+def export_description_of_robot(deck_name: str, out: Path, as_json: bool) -> None:
+    """Write inertias, limits and transmissions as URDF. Springs and friction have no place in it."""
+    from ..export import export_urdf
+    from ..model import flatten
+
+    show_written(as_json, (), [export_urdf(flatten(machine_of(deck_name)), out)])
 
 
 TOGETHER, APART, UNREADABLE = 0, 1, 2

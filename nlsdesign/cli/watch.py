@@ -26,7 +26,7 @@ def export_monitor(
 ) -> None:  # fmt: skip
     """Write the monitor of a deck."""
     from ..components import smoothed
-    from ..export import export_watch
+    from ..export import export_watch, write_watch_a2l
     from ..model import flatten
     from ..regeneration import watch_plan
 
@@ -42,7 +42,7 @@ def export_monitor(
     show_written(
         as_json,
         (f"monitor of {plan.model.name.removesuffix('_residuals')}", *words),
-        source.files,
+        (*source.files, write_watch_a2l(source, out / f"{source.name}.a2l")),
         name=source.name,
     )
 

@@ -3,7 +3,7 @@
 Presentation and commands may import it; it reads models, and designs nothing.
 """
 
-from .c.asap2 import write_a2l
+from .c.asap2 import write_a2l, write_watch_a2l
 from .c.block_code import export_c_with_blocks
 from .c.block_files import read_parameter_block, write_parameter_block
 from .c.block_layout import ParameterBlock
@@ -31,6 +31,7 @@ from .fmi.fmu_documentation import Authorship
 from .fmi.reference_results import write_reference
 from .modelica.modelica_model import export_modelica
 from .mujoco.actuator_model import export_mujoco
+from .mujoco.urdf_model import export_urdf
 
 __all__ = [
     "ALL_PLATFORMS",
@@ -61,6 +62,7 @@ __all__ = [
     "export_fmu",
     "export_modelica",
     "export_mujoco",
+    "export_urdf",
     "export_watch",
     "loadable_model",
     "measure_on_target",
@@ -77,4 +79,5 @@ __all__ = [
     "write_parameter_block",
     "write_reference",
     "write_ssp",
+    "write_watch_a2l",
 ]

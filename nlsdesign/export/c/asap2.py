@@ -1,4 +1,4 @@
-"""An ASAP2 description (A2L, ASAM MCD-2 MC 1.7) of a block and of an instance of the code, for XCP tools.
+"""ASAP2 descriptions (A2L, ASAM MCD-2 MC 1.7) of blocks, instances of the code and monitors, for XCP tools.
 
 Addresses are those of two symbols of the program, with offsets. Without an ELF file they are 0 and the symbol
 links say which symbols; tools fill in the addresses then.
@@ -20,6 +20,7 @@ from ...model.flat import Variable
 from .block_layout import BlockLayout
 from .c_text import Real
 from .guarded_step import STATUS_BITS
+from .watch_code import BINS, WatchSource
 
 _LARGEST_ELF = 1 << 29
 
@@ -68,44 +69,144 @@ def write_a2l(
     --------
     >>> write_a2l(source.layout, "joint.a2l", block="joint_block", elf="firmware.elf")  # doctest: +SKIP
     """
-    for name in (block, instance):
-        if not re.fullmatch(r"[A-Za-z_]\w*", name):
-            raise ExportError(f"symbol '{name}'", "is no name of a variable in C",
-                              next_step="name a variable at file scope of the program")  # fmt: skip
-    addresses = elf_symbols(Path(elf), (block, instance)) if elf else dict.fromkeys((block, instance), 0)
+    addresses = _addresses((block, instance), elf)
     text = a2l_text(layout, Symbol(block, addresses[block]), Symbol(instance, addresses[instance]))
     write_text(Path(path), text)
     return Path(path)
 
 
+def _addresses(names: Sequence[str], elf: str | Path | None) -> Mapping[str, int]:
+    """Return the addresses of variables of a program, 0 without one; what is no name in C is an error."""
+    for name in names:
+        if not re.fullmatch(r"[A-Za-z_]\w*", name):
+            raise ExportError(f"symbol '{name}'", "is no name of a variable in C",
+                              next_step="name a variable at file scope of the program")  # fmt: skip
+    return elf_symbols(Path(elf), names) if elf else dict.fromkeys(names, 0)
+
+
+def write_watch_a2l(
+    source: WatchSource, path: str | Path, *, instance: str = "monitor", elf: str | Path | None = None
+) -> Path:
+    """Write an A2L file of what a monitor has seen: its word, what counts as no change, sums and counts.
+
+    Parameters
+    ----------
+    source
+        Files of the monitor, as :func:`~nlsdesign.export.export_watch` writes them.
+    path
+        File to write.
+    instance
+        Name of the variable in the program that is the state of the monitor.
+    elf
+        Linked program with this symbol, for its address; 0 stands for it without one.
+
+    Returns
+    -------
+    Path
+        Of the file.
+
+    Raises
+    ------
+    ExportError
+        If the name is no identifier, or the program cannot be read or lacks the symbol.
+    """
+    symbol = Symbol(instance, _addresses((instance,), elf)[instance])
+    plan, name = source.plan, source.name
+    of_deck = plan.model.origin.deck if plan.model.origin else plan.model.name
+    about = _File(name, f"monitor of deck {of_deck}", " ".join(f"{w:08x}" for w in plan.digest))
+    write_text(Path(path), about.text(["1"], list(watched_entries(source, symbol))))
+    return Path(path)
+
+
+def watched_entries(source: WatchSource, symbol: Symbol) -> Iterator[str]:
+    """Yield the measurements of the record, which stands first in the state of a monitor."""
+    plan, layout = source.plan, source.plan.layout(source.real)
+    kind, most = _kind(source.real), repr(source.real.largest)
+    fields, width = layout.fields, 4 if source.real is Real.FLOAT else 8
+    assert fields is not None
+
+    def row(name: str, text: str, at: int, is_number: bool = True, count: int = 1) -> Iterator[str]:
+        yield f"    /begin MEASUREMENT {_identifier(f'{source.name}.{name}')}"
+        limits = f"-{most} {most}" if is_number else "0 4294967295"
+        yield f"      {_string(text)} {kind if is_number else 'ULONG'} {_method('1')} 0 0 {limits}"
+        yield f"      ECU_ADDRESS {_address(symbol, at)}"
+        if count > 1:
+            yield f"      MATRIX_DIM {count}"
+        yield f'      SYMBOL_LINK "{symbol.name}" {at}'
+        yield "    /end MEASUREMENT"
+
+    for name in ("magic", "version", "size", "judged", "word", "checksum"):
+        yield from row(name, f"{name} of the record", int(fields[name][1]), is_number=False)
+    moments = int(layout["recent"].base.itemsize)
+    for i, block in enumerate(plan.blocks):
+        for k, change in enumerate(block.changes):
+            at = int(fields["reference"][1]) + (i * plan.most + k) * width
+            yield from row(
+                f"reference.{block.name}.{change}", "counts as no change, in changes to be noticed", at
+            )
+        first, pairs = int(fields["bins"][1]) + i * BINS * moments, moments // width - 1
+        places = [(f"recent.{block.name}", int(fields["recent"][1]) + i * moments)]
+        places += [(f"bins.{block.name}[{k}]", first + k * moments) for k in range(BINS)]
+        for name, at in places:
+            yield from row(f"{name}.count", "means that were used", at)
+            yield from row(f"{name}.products", "sums of products", at + width, count=pairs)
+
+
 def a2l_text(layout: BlockLayout, block: Symbol, instance: Symbol) -> str:
     """Return the description."""
     numbers = _Description(layout, block, instance)
-    characteristics, measurements = list(numbers.characteristics()), list(numbers.measurements())
-    lines = [
-        "ASAP2_VERSION 1 71",
-        f"/begin PROJECT {layout.name} {_string(f'{layout.name} of deck {layout.deck}')}",
-        f"  /begin HEADER {_string(f'written by nlsdesign {version()}')}",
-        f'    VERSION "{layout.digest}"',
-        "  /end HEADER",
-        f"  /begin MODULE {layout.name} {_string(f'numbers and signals of {layout.name}')}",
-        '    /begin MOD_COMMON ""',
-        "      BYTE_ORDER MSB_LAST",
-        *(f"      ALIGNMENT_{kind} {size}" for kind, size in _ALIGNMENTS.items()),
-        "    /end MOD_COMMON",
-        f'    /begin MOD_PAR "block of {layout.size} bytes; load it by {layout.name}_load"',
-        f'      VERSION "{layout.digest}"',
-        "    /end MOD_PAR",
-        *numbers.methods(),
+    about = _File(
+        layout.name, f"{layout.name} of deck {layout.deck}", layout.digest,
+        f"block of {layout.size} bytes; load it by {layout.name}_load",
+    )  # fmt: skip
+    layouts = [
         f"    /begin RECORD_LAYOUT number FNC_VALUES 1 {numbers.kind} ROW_DIR DIRECT /end RECORD_LAYOUT",
         "    /begin RECORD_LAYOUT word FNC_VALUES 1 ULONG ROW_DIR DIRECT /end RECORD_LAYOUT",
-        *characteristics,
-        *measurements,
-        "  /end MODULE",
-        "/end PROJECT",
-        "",
     ]
-    return "\n".join(lines)
+    return about.text(numbers.units(), [*layouts, *numbers.characteristics(), *numbers.measurements()])
+
+
+class _File(NamedTuple):
+    """What stands around the entries of a description."""
+
+    name: str
+    about: str
+    digest: str
+    parameters: str = ""
+
+    def text(self, units: Sequence[str], entries: Sequence[str]) -> str:
+        """Return the file: how each unit is shown, as it is, then the entries."""
+        methods = [
+            f"    /begin COMPU_METHOD {_method(unit)} {_string(unit)} IDENTICAL "
+            f'"%.9" {_string("" if unit == "1" else unit)} /end COMPU_METHOD'
+            for unit in units
+        ]
+        lines = [
+            "ASAP2_VERSION 1 71",
+            f"/begin PROJECT {self.name} {_string(self.about)}",
+            f"  /begin HEADER {_string(f'written by nlsdesign {version()}')}",
+            f'    VERSION "{self.digest}"',
+            "  /end HEADER",
+            f"  /begin MODULE {self.name} {_string(f'numbers and signals of {self.name}')}",
+            '    /begin MOD_COMMON ""',
+            "      BYTE_ORDER MSB_LAST",
+            *(f"      ALIGNMENT_{kind} {size}" for kind, size in _ALIGNMENTS.items()),
+            "    /end MOD_COMMON",
+            f"    /begin MOD_PAR {_string(self.parameters)}",
+            f'      VERSION "{self.digest}"',
+            "    /end MOD_PAR",
+            *methods,
+            *entries,
+            "  /end MODULE",
+            "/end PROJECT",
+            "",
+        ]
+        return "\n".join(lines)
+
+
+def _kind(real: Real) -> str:
+    """Return a number type as A2L calls it."""
+    return "FLOAT32_IEEE" if real is Real.FLOAT else "FLOAT64_IEEE"
 
 
 _ALIGNMENTS = {"BYTE": 1, "WORD": 2, "LONG": 4, "FLOAT32_IEEE": 4, "FLOAT64_IEEE": 8}
@@ -121,15 +222,15 @@ class _Description:
     @property
     def kind(self) -> str:
         """The number type as A2L calls it."""
-        return "FLOAT32_IEEE" if self.layout.real is Real.FLOAT else "FLOAT64_IEEE"
+        return _kind(self.layout.real)
 
     @property
     def width(self) -> int:
         """Bytes of a number."""
         return 4 if self.layout.real is Real.FLOAT else 8
 
-    def methods(self) -> list[str]:
-        """Return how each unit is shown: as it is."""
+    def units(self) -> list[str]:
+        """Return all units that occur."""
         layout = self.layout
         columns = [v for t in layout.tables for v in t.columns]
         groups = (
@@ -140,12 +241,7 @@ class _Description:
             layout.inputs,
             layout.outputs,
         )
-        units = sorted({v.unit for group in groups for v in group} | {"1"} | set(self._axis_units()))
-        return [
-            f"    /begin COMPU_METHOD {_method(unit)} {_string(unit)} IDENTICAL "
-            f'"%.9" {_string("" if unit == "1" else unit)} /end COMPU_METHOD'
-            for unit in units
-        ]
+        return sorted({v.unit for group in groups for v in group} | {"1"} | set(self._axis_units()))
 
     def _axis_units(self) -> list[str]:
         named = {v.name: v.unit for v in (*self.layout.inputs, *self.layout.states)}
@@ -173,7 +269,7 @@ class _Description:
 
     def _value(self, name: str, v: Variable, at: int, record: str = "number") -> Iterator[str]:
         yield f"    /begin CHARACTERISTIC {_identifier(name)}"
-        yield f"      {_string(v.description)} VALUE {self._address(self.block, at)} {record} 0"
+        yield f"      {_string(v.description)} VALUE {_address(self.block, at)} {record} 0"
         yield f"      {_method(v.unit)} {self._limits(v)}"
         yield f'      SYMBOL_LINK "{self.block.name}" {at}'
         yield "    /end CHARACTERISTIC"
@@ -182,7 +278,7 @@ class _Description:
         """Yield a column of a table over its grid points: argument, unit and points of the axis."""
         argument, unit, points = axis
         yield f"    /begin CHARACTERISTIC {_identifier(name)}"
-        yield f"      {_string(v.description)} CURVE {self._address(self.block, at)} number 0"
+        yield f"      {_string(v.description)} CURVE {_address(self.block, at)} number 0"
         yield f"      {_method(v.unit)} {self._limits(v)}"
         yield f"      /begin AXIS_DESCR FIX_AXIS {self.quantity(argument)} {_method(unit)} {len(points)}"
         yield f"        {points[0]!r} {points[-1]!r}"
@@ -225,7 +321,7 @@ class _Description:
         name, text, kind = about
         yield f"    /begin MEASUREMENT {name}"
         yield f"      {_string(text)} {kind} {_method(shown[0])} 0 0 {shown[1]}"
-        yield f"      ECU_ADDRESS {self._address(self.instance, at)}"
+        yield f"      ECU_ADDRESS {_address(self.instance, at)}"
         yield f'      SYMBOL_LINK "{self.instance.name}" {at}'
         yield "    /end MEASUREMENT"
 
@@ -233,9 +329,9 @@ class _Description:
         most = self.layout.real.largest
         return f"{max(v.minimum, -most)!r} {min(v.maximum, most)!r}"
 
-    @staticmethod
-    def _address(symbol: Symbol, at: int) -> str:
-        return f"0x{symbol.address + at if symbol.address else 0:08X}"
+
+def _address(symbol: Symbol, at: int) -> str:
+    return f"0x{symbol.address + at if symbol.address else 0:08X}"
 
 
 def _string(text: str) -> str:

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from ...model.flat import Variable
 from ..files import filled
 from .block_layout import MAGIC, VERSION, BlockLayout, ParameterBlock, block_layout
-from .c_text import Real, comment, identifier, signature
+from .c_text import Real, comma_rows, comment, half_byte_sums, identifier, signature
 from .coefficients import LoadableModel
 from .controller_code import write_step
 from .writer import CSource, CWriter, paths_in_memory
-
-_PER_LINE = 6
-"""Numbers of a row in a line of C."""
 
 
 def export_c_with_blocks(
@@ -72,14 +68,6 @@ def block_declarations(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
         ],
         "load_head": [*c.filled("controller_load.h", {"load": _head(c.name)}).splitlines(), ""],
     }
-
-
-def half_byte_sums() -> list[str]:
-    """Return the CRC-32 of each half byte as rows of C."""
-    crc = list(range(16))
-    for _ in range(4):
-        crc = [(k >> 1) ^ (0xEDB88320 if k & 1 else 0) for k in crc]
-    return _lines([f"0x{k:08x}u" for k in crc])
 
 
 def block_functions(c: CWriter, layout: BlockLayout) -> dict[str, list[str]]:
@@ -166,17 +154,13 @@ def initialised(block: ParameterBlock, name: str) -> list[str]:
         lines.append(f".parameters.{paths[v.name]} = {value}, /* {remark} */")
     if layout.coefficients:
         numbers = [real.literal(block.values[v.name]) for v in layout.coefficients]
-        lines += [".coefficients = {", *(f"    {line}" for line in _lines(numbers)), "},"]
+        lines += [".coefficients = {", *(f"    {line}" for line in comma_rows(numbers)), "},"]
     for k, values in enumerate(block.tables):
         lines.append(f".table_{k} = {{")
         for column in values.T.tolist():
-            numbers = _lines([real.literal(value) for value in column])
+            numbers = comma_rows([real.literal(value) for value in column])
             lines += ["    {", *(f"        {line}" for line in numbers), "    },"]
         lines.append("},")
     lines += [f".checksum = 0x{block.checksum:08x}u,", ".unused = 0u,"]
     head = f"/* Numbers of {comment(block.deck) or 'no deck'}, {block.deck_digest[:12] or 'no digest'}. */"
     return [head, f"const {layout.name}_block {name} = {{", *(f"    {line}" for line in lines), "};"]
-
-
-def _lines(items: Sequence[str]) -> list[str]:
-    return [", ".join(items[i : i + _PER_LINE]) + "," for i in range(0, len(items), _PER_LINE)]

@@ -278,3 +278,16 @@ def interface_version(header: str, model: FlatModel) -> str:
     units = [f"{v.name} {v.unit}" for group in groups for v in group]
     # A state that was never started is most often zero, and this number marks one that was.
     return f"0x{zlib.crc32(chr(10).join([*filter(None, lines), *units]).encode()) or 1:08x}u"
+
+
+def comma_rows(items: Sequence[str]) -> list[str]:
+    """Return items of a list of C, six in a line."""
+    return [", ".join(items[i : i + 6]) + "," for i in range(0, len(items), 6)]
+
+
+def half_byte_sums() -> list[str]:
+    """Return the CRC-32 of each half byte as rows of C."""
+    crc = list(range(16))
+    for _ in range(4):
+        crc = [(k >> 1) ^ (0xEDB88320 if k & 1 else 0) for k in crc]
+    return comma_rows([f"0x{k:08x}u" for k in crc])

@@ -15,8 +15,8 @@ from ...foundation.arrays import Array
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import filled, write_all
-from .c_text import SHORT, Real, comment
-from .guarded_step import GuardedModel
+from .c_text import SHORT, Real, comment, half_byte_sums
+from .guarded_step import STATUS_BITS, GuardedModel
 from .writer import CSource, CWriter
 
 SAMPLES = 120
@@ -110,11 +110,11 @@ _OF_THE_CLASS = (
 
 
 def write_examples(source: CSource) -> list[Path]:
-    """Write a C++ class, two main programs and build files beside the files of a step.
+    """Write a C++ class, main programs and build files beside the files of a step.
 
     The main programs are a loop on a POSIX timer and a timer interrupt of a Cortex-M; both say where readings
     come from and where outputs go to. A supervisor turns the status word into the share of a command that
-    may act.
+    may act. A third program answers a desk that plays a record through it, and a script is that desk.
 
     Parameters
     ----------
@@ -145,18 +145,41 @@ def write_examples(source: CSource) -> list[Path]:
         ],
         "nanoseconds": str(round(1e9 * float(source.model.sample_time or 0.0))),
         "microseconds": str(round(1e6 * float(source.model.sample_time or 0.0))),
+        "unit": "4" if source.real is Real.FLOAT else "8",  # bits of __ARM_FP, Arm C Language Extensions
+        **link_values(source),
     }
     files = {
         f"{name}.hpp": "wrapper.hpp",
         f"{name}_supervisor.h": "supervisor.h",
         f"{name}_example_posix.c": "example_posix.c",
         f"{name}_example_cortex_m.c": "example_cortex_m.c",
+        f"{name}_link.h": "link.h",
+        f"{name}_example_link.c": "example_link.c",
+        f"{name}_play.py": "play.txt",
         "CMakeLists.txt": "CMakeLists.txt",
         f"{name}.mk": "example.mk",
     }
     texts = {folder / file: filled(template, values) for file, template in files.items()}
     write_all(texts)
     return list(texts)
+
+
+def link_values(source: CSource) -> dict[str, str | list[str]]:
+    """Return what the frames between a board and a desk hold."""
+    model, paths = source.model, source.writer.paths
+    inputs, outputs = ([v.name for v in group] for group in (model.inputs, model.outputs))
+    return {
+        "inputs": str(len(inputs)),
+        "outputs": str(len(outputs)),
+        "given": [f"outputs->{path}," for path in paths.outputs],
+        "assignments": [f"inputs.{path} = numbers[{i}];" for i, path in enumerate(paths.inputs)],
+        "half_bytes": half_byte_sums(),
+        "names": ", ".join(f"{v.name} [{v.unit}]" for v in model.inputs),
+        "input_tuple": "".join(f"{name!r}, " for name in inputs),
+        "output_tuple": "".join(f"{name!r}, " for name in outputs),
+        "flags": ", ".join(f'"{flag}": 0x{bit:x}' for flag, (bit, _) in STATUS_BITS.items()),
+        "letter": "f" if source.real is Real.FLOAT else "d",
+    }
 
 
 _LONGEST = 120

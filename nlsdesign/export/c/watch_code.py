@@ -22,8 +22,7 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
-from .block_code import half_byte_sums
-from .c_text import Real, comment, identifier, origin_lines, stamped
+from .c_text import Real, comment, half_byte_sums, identifier, origin_lines, stamped
 from .controller_code import export_c
 from .writer import CSource
 
@@ -45,7 +44,8 @@ SPEEDS, LOAD, WARM = (5.0, 25.0), 0.1, 35.0
 """Between bins: speeds as multiples of the least one, load as a share of the largest drive, temperature in
 degrees Celsius."""
 BINS = 12
-FIRST_BIT = 8
+MISFIT, FIRST_BIT = 16, 8
+"""Bit where more efforts are left than the usual load, and the first bit of a change."""
 VERSION = 1
 MAGIC = 0x57534C4E  # "NLSW"
 CHECKED = 8  # bytes at the end that the checksum does not cover
@@ -429,7 +429,8 @@ class WatchTwin:
                 and change * change > r(SURE**2) * variance * work[i, i]
             ):
                 bits |= 1 | 1 << (self.plan.first_bit(number) + i)
-        return bits
+        load = r(self.plan.blocks[number].usual_load)
+        return bits | (1 | MISFIT if variance > load * load else 0)
 
 
 def _forget(moments: Any, kept: Any) -> None:

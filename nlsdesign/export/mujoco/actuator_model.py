@@ -176,7 +176,7 @@ class _Writer:
         if self.inner:
             about = ", ".join(v.name for v in self.inner)
             actuators += [
-                f"<!-- Activations: {_xml_comment(about)}. -->",
+                f"<!-- Activations: {xml_comment(about)}. -->",
                 f'<general name="{HOLDER}" joint={quoteattr(model.bodies[0].name)} dyntype="user" '
                 f'actdim="{len(self.inner)}" gainprm="0"/>',
             ]
@@ -230,7 +230,7 @@ class _Writer:
     def _xml(self, lines: Sequence[str]) -> str:
         head = [f"{self.model.name}: {self.model.description}", *origin_lines(self.model)]
         head.append(f"   All numbers in SI units. Written by nlsdesign {version()}; do not edit.")
-        about = "\n".join(_xml_comment(line) for line in head)
+        about = "\n".join(xml_comment(line) for line in head)
         return "\n".join([f"<!-- {about} -->", *lines]) + "\n"
 
     @cached_property
@@ -297,7 +297,7 @@ class _Writer:
         return print_statements(function, texts, targets, real=Real.DOUBLE)
 
 
-def _xml_comment(text: str) -> str:
+def xml_comment(text: str) -> str:
     """Return text that cannot end a comment of XML, which allows no two hyphens."""
     return text.replace("--", "- -").rstrip("-")
 

@@ -7,6 +7,12 @@
 #include "@name@.h"
 #include "@name@_supervisor.h"
 
+#if defined(__arm__) && !defined(SOFT_NUMBERS)
+#if !defined(__ARM_FP) || (__ARM_FP & @unit@) == 0
+#error "no floating-point unit for @real@: a step takes forty times longer. Give the flags of the unit (-mfpu, -mfloat-abi=hard), export with --real float for one without double, or define SOFT_NUMBERS where the time is there"
+#endif
+#endif
+
 #ifndef CORE_CLOCK
 #define CORE_CLOCK 168000000u /* Hz */
 #endif

@@ -113,6 +113,9 @@ static uint32_t judged(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *m
                 word |= @NAME@_CHANGED | (1u << (block->first_bit + i));
             }
         }
+        if (variance > block->load * block->load) {
+            word |= @NAME@_CHANGED | @NAME@_MISFIT;
+        }
     }
     return word;
 }

@@ -19,6 +19,7 @@
 #define @NAME@_LITTLE_EVIDENCE 0x2u /* too little motion of late to say anything */
 #define @NAME@_NOT_USED 0x4u /* this sample: a reading was refused, or the machine stands still */
 #define @NAME@_NOT_STARTED 0x8u /* init was not called */
+#define @NAME@_MISFIT 0x10u /* with CHANGED: more efforts are left than the usual load, and no change takes them away */
 @names@
 
 /* Sums of products over means that were used. */
@@ -58,8 +59,8 @@ typedef struct {
 
 /* One running instance; the caller owns it. No pointer may be null; none is checked. */
 typedef struct {
+    @name@_record record; /* first: descriptions for other tools count from here */
     @name@_residuals_state residuals;
-    @name@_record record;
     @name@_gathered gathered[@NAME@_BLOCKS];
     @real@ work[@NAME@_MOST + 1u][@NAME@_MOST + 1u];
     uint32_t sample; /* in the mean */

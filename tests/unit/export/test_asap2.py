@@ -11,11 +11,14 @@ from pathlib import Path
 
 import pytest
 
-from nlsdesign.export import write_a2l
+import nlsdesign as nls
+from nlsdesign.components import smoothed
+from nlsdesign.export import export_watch, write_a2l, write_watch_a2l
 from nlsdesign.export.c.asap2 import elf_symbols
 from nlsdesign.export.c.writer import paths_in_memory
 from nlsdesign.export.compilation.cross_compiler import run_compiler
 from nlsdesign.foundation.errors import ExportError
+from nlsdesign.regeneration import watch_plan
 from tests.blocks import exported
 from tests.compiling import compile_program
 
@@ -166,6 +169,45 @@ def test_an_independent_reader_finds_nothing_wrong(joint, tmp_path):
         [READER, "--strict", "--check", damaged], capture_output=True, text=True, check=False
     )
     assert "No problems found" not in again.stdout + again.stderr
+
+
+def test_the_record_of_a_monitor_lies_where_its_description_says(tmp_path):
+    """Offsets by the compiler of this machine, sizes of arrays, and an independent reader."""
+    plant = nls.flatten(smoothed(nls.declare(nls.load_deck("austin2015_figure_consistent"))))
+    source = export_watch(watch_plan(plant, 1e-3), tmp_path)
+    path = write_watch_a2l(source, tmp_path / "watch.a2l")
+    (block,) = source.plan.blocks
+    members = {f"watch.{w}": w for w in ("magic", "version", "size", "judged", "word", "checksum")}
+    members |= {
+        f"watch.reference.{block.name}.{change}": f"reference[0][{k}]"
+        for k, change in enumerate(block.changes)
+    }
+    for group, place in [("recent.motor", "recent[0]")] + [
+        (f"bins.motor[{k}]", f"bins[0][{k}]") for k in range(12)
+    ]:
+        members |= {f"watch.{group}.{w}": f"{place}.{w}" for w in ("count", "products")}
+    lines = [
+        f'    printf("{name} %zu %zu\\n", offsetof(watch_state, record.{member}), '
+        f"sizeof(((watch_state *)0)->record.{member}));"
+        for name, member in members.items()
+    ]
+    main = tmp_path / "offsets.c"
+    head = '#include <stdio.h>\n#include <stddef.h>\n#include "watch.h"\nint main(void)\n{\n'
+    main.write_text(head + "\n".join(lines) + "\n    return 0;\n}\n")
+    written = subprocess.run([compile_program([main], tmp_path / "offsets", flags=[])],
+                             capture_output=True, check=True, text=True).stdout  # fmt: skip
+    found = {each.items[0]: each for each in module(path).of("MEASUREMENT")}
+    assert found.keys() == members.keys()
+    for line in written.splitlines():
+        name, at, size = line.split()
+        each = found[name]
+        count = int(each.after("MATRIX_DIM", 1)[0]) if "MATRIX_DIM" in each.items else 1
+        assert (each.after("SYMBOL_LINK", 2), 4 * count) == (['"monitor"', at], int(size)), name
+    if READER is not None:
+        run = subprocess.run(
+            [READER, "--strict", "--check", path], capture_output=True, text=True, check=False
+        )
+        assert "No problems found" in run.stdout + run.stderr
 
 
 @pytest.mark.parametrize("target", ["x86_64-freestanding", "thumb-freestanding-eabihf"])

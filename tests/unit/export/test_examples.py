@@ -20,6 +20,7 @@ from nlsdesign.export.c.guarded_step import (
     index_bit,
 )
 from nlsdesign.export.compilation.cross_compiler import STRICT, compile_library, run_compiler
+from nlsdesign.foundation.errors import ExportError
 from tests.compiling import compile_program
 from tests.hand_built import observer
 
@@ -73,6 +74,27 @@ def test_the_program_on_a_posix_timer_runs(source: CSource, tmp_path) -> None:
         [*STRICT, "-I", folder, "-c", folder / "loop_example_cortex_m.c", "-o", tmp_path / "timer.o"],
         about="the example",
     )
+
+
+def test_a_board_without_a_unit_for_its_numbers_is_told_so(tmp_path) -> None:
+    """A Cortex-M3 has none, that of a Cortex-M4F knows no double; who has the time may go on."""
+    for real, features, said in (
+        ("float", "cortex_m4+vfp4d16sp", ""),
+        ("double", "cortex_m7+fp_armv8d16", ""),
+        ("double", "cortex_m4+vfp4d16sp", "unit for double"),
+        ("float", "cortex_m3", "unit for float"),
+    ):
+        folder = tmp_path / f"{real}_{features}"
+        write_examples(export_c(observer(), folder, name="loop", real=real))
+        ending = "eabi" if features == "cortex_m3" else "eabihf"
+        target = ["-target", f"thumb-freestanding-{ending}", f"-mcpu={features}"]
+        command = [*target, "-I", folder, "-o", folder / "timer.o", "-c"]
+        program = folder / "loop_example_cortex_m.c"
+        if said:
+            with pytest.raises(ExportError, match=f"{said}: a step takes forty times longer"):
+                run_compiler([*command, program], about="the example")
+            command.append("-DSOFT_NUMBERS")
+        run_compiler([*command, program], about="the example")
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")

@@ -13,14 +13,14 @@ import nlsdesign as nls
 from nlsdesign.components import smoothed
 from nlsdesign.export import CORTEX_M4F, export_watch, measure_on_target, read_watch_record
 from nlsdesign.export.c.c_text import Real
-from nlsdesign.export.c.watch_code import LENGTH, WatchTwin, drawn_rows
+from nlsdesign.export.c.watch_code import LENGTH, MISFIT, WatchTwin, drawn_rows
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.target_run import missing_emulator
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.regeneration import read_watch, watch_plan
 from tests.compiling import compile_program
 from tests.watched import joint_deck
-from tests.watching import as_step
+from tests.watching import as_step, quick, readings
 
 DECK = "austin2015_figure_consistent"
 
@@ -41,27 +41,6 @@ def joint(tmp_path_factory):
     return plan_of(file, 2e-3)
 
 
-def quick(plan):
-    """Judge every five means, and at once."""
-    return replace(
-        plan, between=5.0 * LENGTH * plan.model.sample_time, settling=plan.model.sample_time, least=4.0
-    )
-
-
-def readings(plan, count):
-    """Angles that swing, a current that goes with them, and two samples that are no number."""
-    time = np.arange(count) * plan.model.sample_time
-    swing = 0.5 * np.sin(9.0 * time) + 0.1 * np.sin(31.0 * time)
-    columns = {
-        "motor.current": 3.0 * swing,
-        "ammeter.reading": 0.6 * swing,
-        "load_encoder.reading": 0.95 * swing,
-    }
-    table = np.column_stack([columns.get(v.name, swing) for v in plan.model.inputs]).astype(np.float32)
-    table[count // 2 : count // 2 + 2, 0] = np.nan
-    return table.astype(float)
-
-
 @pytest.mark.long_cases("published-float")
 @pytest.mark.parametrize("real", list(Real))
 @pytest.mark.parametrize("machine", ["published", pytest.param("joint", marks=pytest.mark.slow)])
@@ -80,7 +59,7 @@ def test_the_c_has_the_bits_of_its_twin(machine, real, request, tmp_path):
         given, status = residuals(row)
         expected.append(twin.take([part.tolist() for part in np.split(given, ends)], status == 0))
     assert words == expected
-    assert {0, 2} <= {word & 3 for word in words}  # judged, after too little had been seen
+    assert {2} < {word & 3 for word in words}  # judged, after too little had been seen
     memory, record = bytes(whole._state), twin.record.tobytes()
     at = memory.index(record[:8])
     assert memory[at : at + len(record)] == record
@@ -125,6 +104,21 @@ def test_rows_that_follow_the_first_change_of_each_block_say_so(joint):
     first = [1 << plan.first_bit(i) for i in range(2)]
     assert words[-1] & ~4 == 1 | first[0] | first[1]
     assert words[0] & 3 == 2
+
+
+def test_more_left_than_any_change_explains_is_a_word_of_its_own(published):
+    """Efforts that go with nothing: no change is sure, and no bit of a change would be set."""
+    plan = quick(published)
+    (block,) = plan.blocks
+    for share, expected in ((0.5, 0), (2.0, 1 | MISFIT)):
+        twin, draw = WatchTwin(plan), np.random.default_rng(5)
+        word = 0
+        for _ in range(60):
+            drawn = draw.normal(size=len(block.changes))
+            left = share * block.usual_load * draw.normal()
+            for _ in range(LENGTH):
+                word = twin.take([[*(1e-3 * drawn), left, 1.0, 1.0]])
+        assert word & ~4 == expected
 
 
 def test_a_mean_counts_where_those_on_both_sides_go_the_same_way(published):
