@@ -368,9 +368,9 @@ def _cam(path: str, part: Through, owners: Owners) -> CamNames:
     rolling = None
     if isinstance(part.cam, RollerCam):
         friction = f"{cam}.guide_friction" if part.cam.needs_rate else None
-        rolling = RollingNames("a roller", f"{cam}.base_radius", f"{cam}.roller_radius", friction)
+        rolling = RollingNames("a roller", f"{cam}.{part.cam.base}", f"{cam}.roller_radius", friction)
     if isinstance(part.cam, RollingPair):
-        rolling = RollingNames("another cam that rolls on it", f"{cam}.base_distance")
+        rolling = RollingNames("another cam that rolls on it", f"{cam}.{part.cam.base}")
     return CamNames(
         name=cam,
         drive=path,

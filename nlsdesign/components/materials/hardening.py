@@ -55,7 +55,7 @@ class SoftWindup(Elastic):
 
     Stands beside a spring that is stiffer than c: a strain wave gear, or a coupling, whose teeth carry one
     after the other. Beyond w only the constant effort c·w is missing, as behind a dead zone of 2·w where c is
-    k. Source: Tuttle 1992 (soft wind-up of a strain wave gear); the tanh is this project's.
+    k. The tanh is a choice: sources give curves. Source: Tuttle 1992 (soft wind-up of a strain wave gear).
 
     Examples
     --------

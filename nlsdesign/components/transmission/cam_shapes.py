@@ -5,6 +5,7 @@ Base of cams without a cable, whose lever arm may be of either sign.
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import dataclass
 
 import casadi as ca
@@ -182,6 +183,11 @@ class MirroredCam(Cam):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_row("lever_arm", self.lever_arm)
+
+    @property
+    @abstractmethod
+    def base(self) -> str:
+        """Name of the length at angle zero that shapes the contour beside the lever arms."""
 
     def extension(self, scope: Scope, angle: Expression) -> Expression:
         """Return δ(θ) = ∫₀^q H."""

@@ -77,6 +77,11 @@ class RollerCam(MirroredCam):
             )
 
     @property
+    def base(self) -> str:
+        """The distance of the roller."""
+        return "base_radius"
+
+    @property
     def needs_rate(self) -> bool:
         """True where the guide has friction."""
         return isinstance(self.guide, SlidingGuide)

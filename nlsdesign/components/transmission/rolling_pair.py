@@ -40,3 +40,8 @@ class RollingPair(MirroredCam):
     base_distance: Quantity = parameter(
         "m", "distance of the two pivots at angle zero", minimum=2e-3, maximum=4.0
     )
+
+    @property
+    def base(self) -> str:
+        """The distance of the pivots."""
+        return "base_distance"

@@ -396,7 +396,11 @@ def _column(
         ("Deck", title.deck),
         ("Design", title.fingerprint),
         ("Material", title.material),
-        ("Edge for", part.size_of_counterpart),
+        (
+            ("Pair", part.size_of_counterpart)
+            if part.partners
+            else (part.counterpart.title(), f"Ø{_length(2 * part.number(f'{part.counterpart}_radius'))} mm")
+        ),
         ("Scale, sheet", f"{scale_text(scale)}, A4, mm"),
     ]
     row, low = 5.2, _BORDER
