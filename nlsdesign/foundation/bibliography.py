@@ -36,7 +36,8 @@ def references() -> Mapping[str, Reference]:
     """Return all publications by key."""
     entries: Mapping[str, Any] = _tables()["sources"]
     return {
-        key: Reference(key, **{**entry, "authors": tuple(entry["authors"])}) for key, entry in entries.items()
+        key: Reference(key, **dict[str, Any](entry, authors=tuple(entry["authors"])))
+        for key, entry in entries.items()
     }
 
 

@@ -87,9 +87,10 @@ class Springpot(Element):
         """
         numbers = {name: quantity.number for name, quantity in self.parameters().items()}
         s = 2j * math.pi * frequency
-        return sum(
-            (modulus * s / (s + rate) for modulus, rate in _branches(**numbers)), start=np.zeros_like(s)
-        )
+        total = np.zeros(len(s), dtype=np.complex128)
+        for modulus, rate in _branches(**numbers):
+            total += modulus * s / (s + rate)
+        return total
 
     def title(self) -> str:
         """Return one line that names the law, its numbers and what the approximation costs."""
