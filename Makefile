@@ -63,7 +63,7 @@ endif
 lint: environment
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
-	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python --min-severity error --summary none
+	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python --min-severity error --summary=none
 
 # To rewrite assertions so that they show their numbers takes a quarter minute of each worker, so only those that fail
 # are run again with it; the run has failed all the same.

@@ -87,10 +87,8 @@ class Springpot(Element):
         """
         numbers = {name: quantity.number for name, quantity in self.parameters().items()}
         s = 2j * math.pi * frequency
-        total = np.zeros(len(s), dtype=np.complex128)
-        for modulus, rate in _branches(**numbers):
-            total += modulus * s / (s + rate)
-        return total
+        parts = [modulus * s / (s + rate) for modulus, rate in _branches(**numbers)]
+        return np.add.reduce(parts, axis=0, dtype=np.complex128)
 
     def title(self) -> str:
         """Return one line that names the law, its numbers and what the approximation costs."""
