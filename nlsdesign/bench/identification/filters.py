@@ -12,7 +12,6 @@ from functools import lru_cache
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from ...foundation.arrays import Array, Mask
 
@@ -71,7 +70,8 @@ def blurred(signal: Array, step: float, *, span: float) -> Array:
     finer = signal
     if times > 1:
         clock = np.arange(len(signal), dtype=np.float64)
-        finer = make_interp_spline(clock, signal, k=5)(np.arange((len(signal) - 1) * times + 1) / times)
+        spline = scipy.interpolate.make_interp_spline(clock, signal, k=5)
+        finer = spline(np.arange((len(signal) - 1) * times + 1) / times)
     over: Array = derivative(finer, step / times, order=1, span=span)[::times]
     return derivative(signal, step, order=1) - over
 

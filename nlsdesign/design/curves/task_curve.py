@@ -20,7 +20,7 @@ from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError
@@ -480,7 +480,8 @@ def _rigid_ratio(goal: TaskGoal, program: TaskProgram, ratios: tuple[float, floa
         drive = program.drive.geared(float(np.exp(log_ratio)))
         return goal.of(beside_cycle(cycle, drive, np.zeros_like(cycle.time)))
 
-    least = minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options={"xatol": 1e-6})
+    options = {"xatol": 1e-6}
+    least = scipy.optimize.minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options=options)
     return float(np.exp(least.x))
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError
@@ -100,7 +100,8 @@ def relaxed_until_measured(relaxing: ca.Function, extension: float, numbers: Arr
         for states in (np.zeros(count), *np.eye(count))
     )
     slopes = np.column_stack(columns) - offset[:, None]
-    flow = expm(MEASURED_AFTER * np.block([[slopes, np.eye(count)], [np.zeros((count, 2 * count))]]))
+    block = np.block([[slopes, np.eye(count)], [np.zeros((count, 2 * count))]])
+    flow = scipy.linalg.expm(MEASURED_AFTER * block)
     return flow[:count, :count], flow[:count, count:]
 
 
