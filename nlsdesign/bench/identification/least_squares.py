@@ -252,7 +252,9 @@ def _step(here: _Linearised, damping: float, walls: tuple[Array, Array]) -> Arra
     lower = _root(here.curvature + np.diag(damping * diagonal), float(diagonal.max()))
     target = -np.linalg.solve(lower, here.gradient)
     most = 20 * len(target)
-    return scipy.optimize.lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=most).x
+    bounded = scipy.optimize.lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=most)
+    step: Array = bounded.x
+    return step
 
 
 def _root(matrix: Array, largest: float) -> Array:

@@ -183,8 +183,9 @@ def _bounded(residual: Array, slope: Array, damping: float, room: tuple[Array, A
     rows = np.vstack([r, np.sqrt(damping) * np.eye(n)])
     target = np.concatenate([-rotated, np.zeros(n)])
     low, high = room[0] * size - 1e-300, room[1] * size + 1e-300
-    result = scipy.optimize.lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n)
-    return result.x / size
+    bounded = scipy.optimize.lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n)
+    solution: Array = bounded.x / size
+    return solution
 
 
 def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:
