@@ -14,7 +14,7 @@ def main() -> None:
 
 def _run() -> None:
     use_one_thread()
-    # Modules and models are no garbage; to look for it after every 700 new objects takes a twentieth of it all.
+    # Modules and models are no garbage; to look for it after every 700 new objects takes a twentieth of all.
     gc.set_threshold(50_000, 20, 20)
     from .cli import main as program
 
