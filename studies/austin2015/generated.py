@@ -36,11 +36,6 @@ class Code(NamedTuple):
     cascade: nls.FlatModel
     best: nls.FlatModel
 
-    @property
-    def observers(self) -> dict[str, nls.FlatModel]:
-        """Both observers by name."""
-        return {"cascade": self.cascade, "best": self.best}
-
 
 @dataclass(frozen=True, eq=False)
 class UnderCode:
@@ -127,7 +122,8 @@ def code_of_three_decks(
 
 def _under(machine: nls.FlatModel, code: Code, *, kind: str, cycles: int) -> UnderCode:
     """Run the machine under the controller and one observer made for a plant."""
-    controller, observer = nls.torque_controller(code.plant, law=ScheduledTorque()), code.observers[kind]
+    controller = nls.torque_controller(code.plant, law=ScheduledTorque())
+    observer = code.best if kind == "best" else code.cascade
     assert controller.origin is not None
     assert observer.origin is not None
     assert controller.origin.digest == observer.origin.digest

@@ -252,8 +252,7 @@ def _step(here: _Linearised, damping: float, walls: tuple[Array, Array]) -> Arra
     lower = _root(here.curvature + np.diag(damping * diagonal), float(diagonal.max()))
     target = -np.linalg.solve(lower, here.gradient)
     most = 20 * len(target)
-    bounded = scipy.optimize.lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=most)
-    step: Array = bounded.x
+    step: Array = scipy.optimize.lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=most).x
     return step
 
 

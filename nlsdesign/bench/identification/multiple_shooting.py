@@ -182,10 +182,9 @@ def _bounded(residual: Array, slope: Array, damping: float, room: tuple[Array, A
     n = len(size)
     rows = np.vstack([r, np.sqrt(damping) * np.eye(n)])
     target = np.concatenate([-rotated, np.zeros(n)])
-    low, high = room[0] * size - 1e-300, room[1] * size + 1e-300
-    bounded = scipy.optimize.lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n)
-    solution: Array = bounded.x / size
-    return solution
+    walls = room[0] * size - 1e-300, room[1] * size + 1e-300
+    step: Array = scipy.optimize.lsq_linear(rows, target, walls, method="bvls", tol=1e-14, max_iter=20 * n).x
+    return step / size
 
 
 def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:

@@ -499,15 +499,10 @@ def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:
     for section, place, content in zip(sections, places, contents, strict=True):
         chapter = isinstance(section, Chapter)
         inside = inside or chapter
-        entries.append(
-            {
-                "title": section.title,
-                "template": section.template,
-                "key": place.key,
-                "level": 2 if chapter or not inside else 3,
-                "content": content,
-            }
-        )
+        entries.append({
+            "title": section.title, "template": section.template, "key": place.key,
+            "level": 2 if chapter or not inside else 3, "content": content,
+        })  # fmt: skip
     return entries
 
 

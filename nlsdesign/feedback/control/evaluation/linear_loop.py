@@ -153,9 +153,8 @@ def plant_of(system: SampledSystem, angles: Array, speed: float) -> LinearPlant:
     wired = [s.removeprefix(start) for s in system.sources.values() if s.startswith(start)]
     spring = series_spring(system.plant)
     signals = [*wired, spring.effort, spring.motion]
-    signals = [name for name in dict.fromkeys(signals) if name != system.driven]
-    at = tuple(map(float, angles))
-    return linear_plant(system.plant, at, driven=str(system.driven), signals=tuple(signals), speed=speed)
+    shown = tuple(name for name in dict.fromkeys(signals) if name != system.driven)
+    return linear_plant(system.plant, tuple(angles), driven=str(system.driven), signals=shown, speed=speed)
 
 
 def assembled(
