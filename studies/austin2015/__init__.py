@@ -16,7 +16,7 @@ from nlsdesign.foundation.work_sharing import parallel_map
 
 from .._published import declared_actuator
 from .design import design_spring
-from .diagnosis import LEFT_OUT, RIVALS, diagnose_bench
+from .diagnosis import RIVALS, SLOWEST, diagnose_bench
 from .evaluation import evaluate_loop
 from .figures import compare_with_figures
 from .generated import Code, code_of_three_decks
@@ -43,7 +43,7 @@ def main(out: Path, fast: bool = False) -> Results:
     def branch(number: int) -> Any:
         """Do what needs nothing of the others, so that each may have a core of its own."""
         if number == 1:
-            catalogue, without = (RIVALS, LEFT_OUT) if fast else (None, ())
+            catalogue, without = (RIVALS, SLOWEST) if fast else (None, ())
             with steps.step("diagnosis of the bench records"):
                 return diagnose_bench(actuator, out, steps, catalogue, without=without)
         name, machine = ("designed", cam.design.actuator) if number else ("published", actuator)
