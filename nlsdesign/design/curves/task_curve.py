@@ -462,8 +462,7 @@ def solved(problem: TaskProblem, program: Program) -> tuple[Program, TaskOptimum
     except InfeasibleError:  # another ratio may do
         first = np.full(program.freedom.shape[1], program.floor)
     ratio, unknowns = best_ratio(begin, first, ends, power=goal.power)
-    made = program.geared(ratio)
-    together = TaskOptimum(unknowns, None)
+    made, together = program.geared(ratio), TaskOptimum(unknowns, None)
     try:  # the same ratio with the bound of its own program
         again = goal.best(made)
     except InfeasibleError:  # the limits leave one point, which the tolerance of a solver misses
@@ -474,11 +473,10 @@ def solved(problem: TaskProblem, program: Program) -> tuple[Program, TaskOptimum
 
 def _rigid_ratio(goal: TaskGoal, program: TaskProgram, ratios: tuple[float, float]) -> float:
     """Return the gear ratio of a motor without a spring that has the least of the goal."""
-    cycle = program.cycle
 
     def paid(log_ratio: float) -> float:
         drive = program.drive.geared(float(np.exp(log_ratio)))
-        return goal.of(beside_cycle(cycle, drive, np.zeros_like(cycle.time)))
+        return goal.of(beside_cycle(program.cycle, drive, np.zeros_like(program.cycle.time)))
 
     options = {"xatol": 1e-6}
     least = scipy.optimize.minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options=options)
