@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import least_squares
+import scipy
 
 from ..bench.identification import RecordSet, agreement, rmse
 from ..bench.identification.multiple_shooting import least_by_cma
@@ -389,7 +389,7 @@ class _Search:
         """Return where Gauss-Newton steps end, from each start."""
         ends = []
         for start in self.starts:
-            reached = least_squares(
+            reached = scipy.optimize.least_squares(
                 lambda x: self.errors(x, self.runs)[0],
                 self.begin(start),
                 jac=lambda x: self.errors(x, self.runs)[1],

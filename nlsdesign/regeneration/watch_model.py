@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from ..bench.discrepancy.tearing import blocks_of
 from ..bench.identification.equation_error.block import Block
@@ -90,7 +90,7 @@ def _filtered(model: FlatModel, reading: str, sample_time: float) -> Filtered:
     # One matrix exponential of the stages, the value and the slope of what drives them.
     whole = np.zeros((5, 5))
     whole[:3, :3], whole[:3, 3], whole[3, 4] = chain, drive, 1.0
-    over = ca.DM(expm(whole * sample_time)[:3])
+    over = ca.DM(scipy.linalg.expm(whole * sample_time)[:3])
     slope = ca.SX(0) if held else (seen - previous) / sample_time
     following = ca.mtimes(over, ca.vertcat(stages, previous, slope))
     first, second, third = ca.vertsplit(stages)

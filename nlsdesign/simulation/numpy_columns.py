@@ -8,8 +8,8 @@ from typing import Any, TypeAlias
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import erf, erfinv
 
 from ..foundation.arrays import Array, Mask
 from ..model import Table
@@ -30,11 +30,11 @@ _FUNCTIONS: Mapping[int, Callable[..., Any]] = {
     ca.OP_HYPOT: np.hypot, ca.OP_SIN: np.sin, ca.OP_COS: np.cos, ca.OP_TAN: np.tan,
     ca.OP_ASIN: np.arcsin, ca.OP_ACOS: np.arccos, ca.OP_ATAN: np.arctan, ca.OP_ATAN2: np.arctan2,
     ca.OP_SINH: np.sinh, ca.OP_COSH: np.cosh, ca.OP_TANH: np.tanh, ca.OP_ASINH: np.arcsinh,
-    ca.OP_ACOSH: np.arccosh, ca.OP_ATANH: np.arctanh, ca.OP_ERF: erf, ca.OP_ERFINV: erfinv,
-    ca.OP_FLOOR: np.floor, ca.OP_CEIL: np.ceil, ca.OP_FMOD: np.fmod, ca.OP_FABS: np.abs, ca.OP_SIGN: np.sign,
-    ca.OP_COPYSIGN: np.copysign, ca.OP_FMIN: np.fmin, ca.OP_FMAX: np.fmax,
-    ca.OP_LT: np.less, ca.OP_LE: np.less_equal, ca.OP_EQ: np.equal, ca.OP_NE: np.not_equal,
-    ca.OP_NOT: np.logical_not, ca.OP_AND: np.logical_and, ca.OP_OR: np.logical_or,
+    ca.OP_ACOSH: np.arccosh, ca.OP_ATANH: np.arctanh, ca.OP_ERF: lambda *of: scipy.special.erf(*of),
+    ca.OP_ERFINV: lambda *of: scipy.special.erfinv(*of), ca.OP_FLOOR: np.floor, ca.OP_CEIL: np.ceil,
+    ca.OP_FMOD: np.fmod, ca.OP_FABS: np.abs, ca.OP_SIGN: np.sign, ca.OP_COPYSIGN: np.copysign,
+    ca.OP_FMIN: np.fmin, ca.OP_FMAX: np.fmax, ca.OP_LT: np.less, ca.OP_LE: np.less_equal, ca.OP_EQ: np.equal,
+    ca.OP_NE: np.not_equal, ca.OP_NOT: np.logical_not, ca.OP_AND: np.logical_and, ca.OP_OR: np.logical_or,
 }  # fmt: skip
 """What an operation of CasADi is in NumPy; a last argument may be the array for the result."""
 

@@ -8,9 +8,11 @@ states why. Design, observer, torque loop and generated code are shown for both 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import nlsdesign as nls
 from nlsdesign.design import DesignSettings
+from nlsdesign.foundation.work_sharing import parallel_map
 
 from .._published import declared_actuator
 from .design import design_spring
@@ -37,12 +39,19 @@ def main(out: Path, fast: bool = False) -> Results:
         cam = design_spring(actuator, out, settings)
     with steps.step("model against the figures of the paper"):
         figures = compare_with_figures(actuator)
-    published = work_up(actuator, out / "actuator.toml", out / "published", steps=steps, fast=fast)
-    designed = work_up(cam.design.actuator, out / "designed.toml", out / "designed", steps=steps, fast=fast)
+
+    def branch(number: int) -> Any:
+        """Do what needs nothing of the others, so that each may have a core of its own."""
+        if number == 1:
+            catalogue, without = (RIVALS, SLOWEST) if fast else (None, ())
+            with steps.step("diagnosis of the bench records"):
+                return diagnose_bench(actuator, out, steps, catalogue, without=without)
+        name, machine = ("designed", cam.design.actuator) if number else ("published", actuator)
+        deck = out / ("designed.toml" if number else "actuator.toml")
+        return work_up(machine, deck, out / name, steps=steps, fast=fast)
+
+    published, verdict, designed = parallel_map(branch, 3)
     both = {"published": published, "designed": designed}
-    with steps.step("diagnosis of the bench records"):
-        catalogue, without = (RIVALS, SLOWEST) if fast else (None, ())
-        verdict = diagnose_bench(actuator, out, steps, catalogue, without=without)
     with steps.step("the diagnosed actuator under code from three decks"):
         codes = {
             name: Code(each.model, each.observers.minimal.model, each.spread.chosen.model)

@@ -21,13 +21,15 @@ from nlsdesign.feedback.control import (
     loop_margins,
     loop_over_spread,
 )
-from nlsdesign.feedback.control.evaluation import whole_evaluation
+from nlsdesign.feedback.control.evaluation import linear_parts, whole_evaluation
+from nlsdesign.feedback.control.evaluation import spread_margins as over_the_spread
 from nlsdesign.feedback.control.evaluation.responses import held_drive
 from nlsdesign.feedback.control.evaluation.spread_margins import (
     GAIN_MARGIN,
     PHASE_MARGIN,
     SHARE,
     SpreadMargins,
+    margins_alone,
     spread_margins,
 )
 from nlsdesign.feedback.control.evaluation.whole_evaluation import with_margin
@@ -63,6 +65,18 @@ def test_the_gain_of_the_studies_is_a_finding_with_the_gain_that_has_a_margin(
     assert "6 dB, 30° are asked for: 14" in margin
     assert "machines of the spread limit-cycle at 3.5 N·m after a step and a kick of 10 ms" in kick
     assert 0.05 < reproduced.cycling < 0.4
+
+
+def test_each_machine_is_linearised_once_for_all_gains(
+    loop: ClosedLoop, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machines, rest_states = [], linear_parts.rest_states
+    monkeypatch.setattr(over_the_spread, "DRAWS", 2)
+    monkeypatch.setattr(
+        linear_parts, "rest_states", lambda *of, **how: (machines.append(of[0]), rest_states(*of, **how))[1]
+    )
+    assert margins_alone(loop, GAIN, last=LAST).enough < 32.0  # so several gains were tried
+    assert len(machines) <= 3
 
 
 @pytest.mark.slow

@@ -12,7 +12,6 @@ from functools import lru_cache
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import make_interp_spline
 
 from ...foundation.arrays import Array, Mask
 
@@ -70,8 +69,8 @@ def blurred(signal: Array, step: float, *, span: float) -> Array:
     times = max(1, math.ceil(_LEAST_POINTS * step / span))
     finer = signal
     if times > 1:
-        clock = np.arange(len(signal), dtype=np.float64)
-        finer = make_interp_spline(clock, signal, k=5)(np.arange((len(signal) - 1) * times + 1) / times)
+        clock = np.arange((len(signal) - 1) * times + 1) / times
+        finer = scipy.interpolate.make_interp_spline(clock[::times], signal, k=5)(clock)
     over: Array = derivative(finer, step / times, order=1, span=span)[::times]
     return derivative(signal, step, order=1) - over
 

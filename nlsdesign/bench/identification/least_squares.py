@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import lsq_linear
+import scipy
 
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ConvergenceError
@@ -251,7 +251,8 @@ def _step(here: _Linearised, damping: float, walls: tuple[Array, Array]) -> Arra
     diagonal = np.diag(here.curvature)
     lower = _root(here.curvature + np.diag(damping * diagonal), float(diagonal.max()))
     target = -np.linalg.solve(lower, here.gradient)
-    step: Array = lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=20 * len(target)).x
+    most = 20 * len(target)
+    step: Array = scipy.optimize.lsq_linear(lower.T, target, walls, method="bvls", tol=1e-14, max_iter=most).x
     return step
 
 
@@ -422,7 +423,7 @@ def promised_costs(
     if not free.any():
         return Promise(0.5 * float(residual @ residual), far)
     bounds = (low - start)[free] * size[free], (high - start)[free] * size[free]
-    bounded = lsq_linear(slope[:, free] / size[free], -residual, bounds, method="bvls")
+    bounded = scipy.optimize.lsq_linear(slope[:, free] / size[free], -residual, bounds, method="bvls")
     return Promise(float(bounded.cost), far)
 
 
@@ -434,7 +435,7 @@ def gauss_newton_step(
     residual, slope = StackedRows(evidence, parameters)(start)
     size = np.maximum(np.linalg.norm(slope, axis=0), 1e-300)
     bounds = np.minimum((low - start) * size, -1e-12), np.maximum((high - start) * size, 1e-12)
-    bounded = lsq_linear(slope / size, -residual, bounds, method="bvls")
+    bounded = scipy.optimize.lsq_linear(slope / size, -residual, bounds, method="bvls")
     end = np.clip(start + bounded.x / size, low, high)
     moved = (replace(p, start=p.outward(value)) for p, value in zip(parameters, end, strict=True))
     return float(bounded.cost), tuple(moved)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import lsq_linear
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, MeasurementError, missing_library
@@ -182,9 +182,9 @@ def _bounded(residual: Array, slope: Array, damping: float, room: tuple[Array, A
     n = len(size)
     rows = np.vstack([r, np.sqrt(damping) * np.eye(n)])
     target = np.concatenate([-rotated, np.zeros(n)])
-    low, high = room[0] * size - 1e-300, room[1] * size + 1e-300
-    solution: Array = lsq_linear(rows, target, (low, high), method="bvls", tol=1e-14, max_iter=20 * n).x
-    return solution / size
+    walls = room[0] * size - 1e-300, room[1] * size + 1e-300
+    step: Array = scipy.optimize.lsq_linear(rows, target, walls, method="bvls", tol=1e-14, max_iter=20 * n).x
+    return step / size
 
 
 def coloured_sigma(simulated: SimulatedFit) -> dict[str, float]:

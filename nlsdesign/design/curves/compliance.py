@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BSpline
+import scipy
 
 from ...foundation.arrays import Array
 from .task import TaskCycle
@@ -40,7 +40,7 @@ class ComplianceSpline:
 
     def matrices(self, torque: Array) -> tuple[Array, Array, Array]:
         """Return what maps coefficients to deflection and its first two derivatives, shape (n, size) each."""
-        spline = BSpline(self.knots, np.eye(self.size), 2)
+        spline = scipy.interpolate.BSpline(self.knots, np.eye(self.size), 2)
         integral = spline.antiderivative()
         at = np.clip(torque, self.low, self.high)
         zero = integral(np.array([0.0]))

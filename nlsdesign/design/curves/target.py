@@ -12,7 +12,6 @@ import casadi as ca
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator, PPoly
 
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ValueRangeError
@@ -297,10 +296,10 @@ class TabulatedTorque(Target):
                 )
 
     @property
-    def _curve(self) -> PPoly:
+    def _curve(self) -> scipy.interpolate.PPoly:
         if self.slopes:
-            return CubicHermiteSpline(self.angles, self.torques, self.slopes)
-        return PchipInterpolator(self.angles, self.torques)
+            return scipy.interpolate.CubicHermiteSpline(self.angles, self.torques, self.slopes)
+        return scipy.interpolate.PchipInterpolator(self.angles, self.torques)
 
     @property
     def last_angle(self) -> float:
@@ -338,12 +337,12 @@ def table_of_curve(table: str, what: str, angles: tuple[float, ...], values: tup
     return points
 
 
-def straight(at: tuple[float, ...], values: tuple[float, ...]) -> PPoly:
+def straight(at: tuple[float, ...], values: tuple[float, ...]) -> scipy.interpolate.PPoly:
     """Return the straight lines between points."""
-    return PPoly(np.array([np.diff(values) / np.diff(at), values[:-1]]), np.array(at))
+    return scipy.interpolate.PPoly(np.array([np.diff(values) / np.diff(at), values[:-1]]), np.array(at))
 
 
-def piecewise(polynomial: PPoly, at: Expression) -> Expression:
+def piecewise(polynomial: scipy.interpolate.PPoly, at: Expression) -> Expression:
     """Return a piecewise polynomial as an expression; beyond its ends the outer pieces go on."""
     inner = [float(item) for item in polynomial.x[1:-1]]
     local = at - ca.pw_const(at, inner, [float(item) for item in polynomial.x[:-1]])

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, TypeVar
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError, NlsError, ValueRangeError
@@ -462,8 +462,7 @@ def solved(problem: TaskProblem, program: Program) -> tuple[Program, TaskOptimum
     except InfeasibleError:  # another ratio may do
         first = np.full(program.freedom.shape[1], program.floor)
     ratio, unknowns = best_ratio(begin, first, ends, power=goal.power)
-    made = program.geared(ratio)
-    together = TaskOptimum(unknowns, None)
+    made, together = program.geared(ratio), TaskOptimum(unknowns, None)
     try:  # the same ratio with the bound of its own program
         again = goal.best(made)
     except InfeasibleError:  # the limits leave one point, which the tolerance of a solver misses
@@ -474,13 +473,13 @@ def solved(problem: TaskProblem, program: Program) -> tuple[Program, TaskOptimum
 
 def _rigid_ratio(goal: TaskGoal, program: TaskProgram, ratios: tuple[float, float]) -> float:
     """Return the gear ratio of a motor without a spring that has the least of the goal."""
-    cycle = program.cycle
 
     def paid(log_ratio: float) -> float:
         drive = program.drive.geared(float(np.exp(log_ratio)))
-        return goal.of(beside_cycle(cycle, drive, np.zeros_like(cycle.time)))
+        return goal.of(beside_cycle(program.cycle, drive, np.zeros_like(program.cycle.time)))
 
-    least = minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options={"xatol": 1e-6})
+    options = {"xatol": 1e-6}
+    least = scipy.optimize.minimize_scalar(paid, bounds=np.log(ratios), method="bounded", options=options)
     return float(np.exp(least.x))
 
 

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple, Self
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import linprog, nnls
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import InfeasibleError
@@ -315,7 +315,8 @@ def _lowest(hessian: Array, slope: Array, floor: float) -> float:
     values, vectors = np.linalg.eigh(hessian)
     root = np.sqrt(np.maximum(values, 1e-14 * values[-1]))
     # y = floor + z with z ≥ 0 is a non-negative least-squares problem in the root of H.
-    at = floor + nnls((vectors * root).T, -(vectors.T @ (slope + floor * hessian.sum(axis=1))) / root)[0]
+    target = -(vectors.T @ (slope + floor * hessian.sum(axis=1))) / root
+    at = floor + scipy.optimize.nnls((vectors * root).T, target)[0]
     rest = hessian @ at + slope
     rest[np.abs(rest) < 1e-9 * np.max(np.abs(slope))] = 0.0
     if np.any(rest < 0.0):  # not an optimum: this point proves nothing
@@ -330,7 +331,7 @@ def conflict(program: TaskProgram) -> InfeasibleError:
     for each in rows:
         count, size = each.matrix.shape
         column = np.full((count, 1), -each.largest)
-        solution = linprog(
+        solution = scipy.optimize.linprog(
             np.append(np.zeros(size), 1.0),
             A_ub=np.vstack([np.hstack([each.matrix, column]), np.hstack([-each.matrix, column])]),
             b_ub=np.concatenate([-each.offset, each.offset]),
@@ -423,7 +424,7 @@ def _least_largest(
     """Return y with the least maximum of abs(matrix·y + offset) in limits and bounds; else their middle."""
     blocks = [(matrix, offset, -1.0, 0.0), *((e.matrix, e.offset, 0.0, e.largest) for e in limits)]
     sides = [(sign, block) for sign in (1.0, -1.0) for block in blocks]
-    solution = linprog(
+    solution = scipy.optimize.linprog(
         np.append(np.zeros(matrix.shape[1]), 1.0),
         A_ub=np.vstack([np.column_stack([sign * m, np.full(len(o), p)]) for sign, (m, o, p, _) in sides]),
         b_ub=np.concatenate([room - sign * o for sign, (_, o, _, room) in sides]),

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import BPoly
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
@@ -51,7 +51,7 @@ def lip_edge(
     """
     _check_curvature(contour, cable_radius)
     directions = contour.directions
-    support = BPoly.from_derivatives(
+    support = scipy.interpolate.BPoly.from_derivatives(
         directions,
         np.column_stack(
             [contour.lever_arms, contour.slopes, contour.radii_of_curvature - contour.lever_arms]

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
-from scipy.interpolate import BPoly
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
@@ -199,7 +199,7 @@ def roller_edge(contour: RollerContour, *, over_travel: float) -> LipEdge:
 
 def _arcs_along(bearings: Array, way: Array, radius: float) -> tuple[ArcPath, float]:
     """Return the edge of a roller's way as arcs; columns of ``way``: ρ and its derivatives by the bearing."""
-    centre = BPoly.from_derivatives(bearings, way)
+    centre = scipy.interpolate.BPoly.from_derivatives(bearings, way)
 
     def over(first: float, last: float) -> tuple[ArcPath, float]:
         at = np.linspace(first, last, _CHECKED)

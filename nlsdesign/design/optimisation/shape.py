@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import PPoly
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
@@ -178,7 +178,7 @@ class RollerVariables(FreeContour):
         nodes, slopes = value(design.angles), value(design.lever_arm_slopes)
         share = np.arange(_POINTS) / _POINTS
         bearings = np.append((nodes[:-1, None] + np.diff(nodes)[:, None] * share).ravel(), nodes[-1])
-        law = PPoly(np.array([np.diff(slopes) / np.diff(nodes), slopes[:-1]]), nodes)
+        law = scipy.interpolate.PPoly(np.array([np.diff(slopes) / np.diff(nodes), slopes[:-1]]), nodes)
         arms, way = law.antiderivative(), law.antiderivative(2)
         rho = design.parameters[design.cam.rolling.base]  # type: ignore[union-attr]
         return roller_contour(

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import casadi as ca
 import numpy as np
-from scipy.special import ndtri
+import scipy
 
 from ...foundation.errors import ArrangementError, ValueRangeError
 from ...foundation.quantity import Quantity
@@ -128,7 +128,7 @@ class ToleranceQuantile(Goal):
         variance = 4.0 * ca.sumsqr(cross) + 2.0 * ca.sumsqr(gram) + ca.dot(peaked, ca.diag(gram) ** 2)
         # The quantile of a multiple of χ² of which mean and variance are known.
         ratio = (variance + least**2) / (9.0 * mean**2)
-        return mean * (1.0 - ratio + float(ndtri(self.share)) * ca.sqrt(ratio)) ** 3
+        return mean * (1.0 - ratio + float(scipy.special.ndtri(self.share)) * ca.sqrt(ratio)) ** 3
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple, cast
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.symbolic import Expression
@@ -86,7 +86,7 @@ def _numbers_of(target: TabulatedTorque) -> Array:
 
     It is the same array where it is asked for again, so it cannot be changed.
     """
-    curve = PchipInterpolator(target.angles, target.torques)
+    curve = scipy.interpolate.PchipInterpolator(target.angles, target.torques)
     # The curve is monotone between its points, so the largest torque is that of a point.
     ends = [max(target.torques), float(curve.integrate(0.0, target.last_angle))]
     numbers: Array = np.concatenate([curve.x, curve.c.T.ravel(), ends])

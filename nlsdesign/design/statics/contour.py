@@ -38,8 +38,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import make_interp_spline
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
@@ -290,7 +290,7 @@ def contour_from_lever_arm(angles: ArrayLike, lever_arms: ArrayLike, *, anchor_d
             f"anchor_distance = {1e3 * anchor_distance:g} mm",
             f"must exceed the largest lever arm, {1e3 * float(np.max(np.abs(arm))):.4g} mm",
         )
-    spline = make_interp_spline(theta, arm, k=5)
+    spline = scipy.interpolate.make_interp_spline(theta, arm, k=5)
     first, second = spline(theta, 1), spline(theta, 2)
     root = np.sqrt(anchor_distance**2 - arm**2)
     speed = 1.0 + first / root

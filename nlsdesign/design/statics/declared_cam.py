@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from typing import Any, Generic, TypeVar
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 
 from ...components.transmission.cam import Cam, TwoSidedCam
 from ...components.transmission.cam_shapes import AnchoredCam, MirroredCam, OneSidedCam
@@ -140,12 +140,12 @@ class _Rolling(DeclaredCam[Made]):
         """Infinite: there is no cable."""
         return math.inf
 
-    def law(self, last_angle: float | None, points: int) -> tuple[Array, BSpline]:
+    def law(self, last_angle: float | None, points: int) -> tuple[Array, scipy.interpolate.BSpline]:
         """Return angles, and the lever arm on its side as a spline."""
         part: Any = self.part
         end, row = part.last_angle.number, np.array(part.lever_arm.values)
         angles = np.linspace(0.0, _end(end, last_angle), points)
-        return angles, BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
+        return angles, scipy.interpolate.BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
 
     def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
         """Return a cam with that lever arm, fitted through the law of this kind."""
@@ -295,8 +295,8 @@ class _Designed(DeclaredCam[Cam]):
         p, slope, rho = self.designed.lever_arms, self.designed.slopes, self.designed.radii_of_curvature
         return Contour(
             directions,
-            CubicHermiteSpline(at, p, slope)(directions),
-            CubicHermiteSpline(at, slope, rho - p)(directions),
+            scipy.interpolate.CubicHermiteSpline(at, p, slope)(directions),
+            scipy.interpolate.CubicHermiteSpline(at, slope, rho - p)(directions),
             np.interp(directions, at, rho),
             self.designed.anchor_distance,
         )
@@ -475,7 +475,7 @@ def _lever_arms(row: Quantity, last: Quantity, at: Array) -> Array:
 
 def _dense(angles: Array, lever_arms: Array, count: int) -> tuple[Array, Array]:
     dense = np.linspace(0.0, angles[-1], max(_SAMPLES_PER_VALUE * count, len(angles)))
-    return dense, make_interp_spline(angles, lever_arms, k=3)(dense)
+    return dense, scipy.interpolate.make_interp_spline(angles, lever_arms, k=3)(dense)
 
 
 def _row(old: Quantity, values: Array) -> Quantity:

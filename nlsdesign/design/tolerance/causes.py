@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, unknown_name
@@ -123,7 +123,7 @@ class SinceMade(Spread):
 
     def number(self, value: float, x: Array) -> Array:
         """Return the value and the share of the loss, Φ(x)."""
-        result: Array = value + ndtr(x)
+        result: Array = value + scipy.special.ndtr(x)
         return result
 
     def slope(self, value: float) -> float:

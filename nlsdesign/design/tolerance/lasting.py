@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError
@@ -99,8 +99,8 @@ def relaxed_until_measured(relaxing: ca.Function, extension: float, numbers: Arr
         np.array(relaxing(extension, 0.0, states, numbers)[1], dtype=float).ravel()
         for states in (np.zeros(count), *np.eye(count))
     )
-    slopes = np.column_stack(columns) - offset[:, None]
-    flow = expm(MEASURED_AFTER * np.block([[slopes, np.eye(count)], [np.zeros((count, 2 * count))]]))
+    a = np.column_stack(columns) - offset[:, None]
+    flow = scipy.linalg.expm(MEASURED_AFTER * np.block([[a, np.eye(count)], [np.zeros((count, 2 * count))]]))
     return flow[:count, :count], flow[:count, count:]
 
 

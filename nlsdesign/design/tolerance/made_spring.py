@@ -26,7 +26,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+import scipy
 
 from ...foundation.arrays import Array, Indices
 from ...foundation.errors import ConvergenceError
@@ -58,10 +58,10 @@ class MadeCam:
 
     angles: Array  # θ in rad, ascending from zero, shape (n,)
     anchor: float  # D in m; infinite for a cable that stays parallel
-    table: CubicHermiteSpline  # splines of the lever arm over u
+    table: scipy.interpolate.CubicHermiteSpline  # splines of the lever arm over u
     # profiles: for each cause of declared numbers of the cam the change of the lever arm per standard
     # deviation
-    profiles: dict[str, CubicHermiteSpline]
+    profiles: dict[str, scipy.interpolate.CubicHermiteSpline]
     extensions: Array  # δ at the angles without errors, shape (n,), in m
 
     @cached_property
@@ -219,7 +219,7 @@ def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[
         turning = 1.0 / (1.0 + slopes[0] / np.sqrt(anchor**2 - values[0] ** 2))
         values[1:] *= turning
         slopes[1:] = np.gradient(values[1:], nodes, axis=1)
-    splines = [CubicHermiteSpline(nodes, v, s) for v, s in zip(values, slopes, strict=True)]
+    splines = [scipy.interpolate.CubicHermiteSpline(nodes, v, s) for v, s in zip(values, slopes, strict=True)]
     stretched = ca.Function("extension", [angle, parameters], [extension])(angles.reshape(1, -1), numbers)
     return MadeCam(
         angles=angles,

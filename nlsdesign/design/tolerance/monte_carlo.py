@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
-from scipy.special import ndtri
+import scipy
 
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
@@ -244,12 +243,12 @@ def _effects(made: MadeSpring, with_less: _WithLess, acting: Sequence[int]) -> l
         else:
             halved, measured = (with_less(k, part) for part in (0.5, 1.0))
         # The 95 % quantile for one cause, from evenly spaced shares of its distribution.
-        normal = ndtri((np.arange(_STRATA) + 0.5) / _STRATA)
+        normal = scipy.special.ndtri((np.arange(_STRATA) + 0.5) / _STRATA)
         places = made.causes[k].spread.deviate(normal)
         nodes = np.linspace(places[0], places[-1], _NODES)
         deviations = np.zeros((_NODES, len(made.causes)))
         deviations[:, k] = nodes
-        errors = made.rms(CubicSpline(nodes, made.torques(deviations))(places))
+        errors = made.rms(scipy.interpolate.CubicSpline(nodes, made.torques(deviations))(places))
         return CauseEffect(
             cause=made.causes[k],
             share=shares[0],

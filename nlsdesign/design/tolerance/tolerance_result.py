@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import bdtr
+import scipy
 
 from ...foundation.arrays import Array
 from ...foundation.csv_tables import Axis, data_frame
@@ -45,7 +45,7 @@ def quantile(errors: Array, share: float) -> QuantileEstimate:
     draws enclose it.
     """
     ordered, count = np.sort(errors), len(errors)
-    fewer = bdtr(np.arange(count + 1), count, share)
+    fewer = scipy.special.bdtr(np.arange(count + 1), count, share)
     below, above = np.searchsorted(fewer, [(1 - _CONFIDENCE) / 2, (1 + _CONFIDENCE) / 2])
     lower = ordered[below - 1] if below >= 1 else 0.0
     upper = ordered[above] if above < count else np.inf

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import expm, solve_discrete_are
+import scipy
 
 from ...foundation.arrays import Array, Mask
 from ...foundation.errors import ConvergenceError, ValueRangeError, unknown_name
@@ -108,7 +108,7 @@ def discrete_noise(a: Array, density: Array, sample_time: float) -> tuple[Array,
     """
     n = len(a)
     block = np.block([[-a, density], [np.zeros((n, n)), a.T]]) * sample_time
-    whole = expm(block)
+    whole = scipy.linalg.expm(block)
     transition: Array = whole[n:, n:].T
     covariance = transition @ whole[:n, n:]
     return transition, (covariance + covariance.T) / 2
@@ -127,7 +127,7 @@ def steady_state_kalman(
     phi, c = transition * unit[None, :] / unit[:, None], measured * unit[None, :] / spread[:, None]
     w = noise / unit[:, None] / unit[None, :]
     try:
-        prior = solve_discrete_are(phi.T, c.T, w, np.eye(len(c)))
+        prior = scipy.linalg.solve_discrete_are(phi.T, c.T, w, np.eye(len(c)))
     except (np.linalg.LinAlgError, ValueError) as error:
         raise ConvergenceError(
             "steady-state Kalman filter", f"the Riccati equation has no solution: {error}",

@@ -25,6 +25,7 @@ from ...foundation.errors import ExportError, ValueRangeError, visible
 from ...foundation.locations import version
 from ...foundation.quantity import typeset_number
 from ...foundation.text_files import write_text
+from ...foundation.work_sharing import parallel_map
 from ..figures import Figure, inline_svg
 from ..figures.style import TONES, alternative_text, compact
 from ..figures.svg import figure_data
@@ -492,19 +493,16 @@ def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:
     if not sections:
         raise ValueRangeError("report", "has no section", next_step="give write_report at least one")
     entries, inside = [], False
-    for number, section in enumerate(sections, start=1):
-        place = PagePosition(f"s{number}", folder)
+    places = [PagePosition(f"s{number}", folder) for number in range(1, len(sections) + 1)]
+    # Drawing the figures takes the time, so each core draws some of them.
+    contents = parallel_map(lambda k: sections[k].content(places[k]), len(sections))
+    for section, place, content in zip(sections, places, contents, strict=True):
         chapter = isinstance(section, Chapter)
         inside = inside or chapter
-        entries.append(
-            {
-                "title": section.title,
-                "template": section.template,
-                "key": place.key,
-                "level": 2 if chapter or not inside else 3,
-                "content": section.content(place),
-            }
-        )
+        entries.append({
+            "title": section.title, "template": section.template, "key": place.key,
+            "level": 2 if chapter or not inside else 3, "content": content,
+        })  # fmt: skip
     return entries
 
 

@@ -14,7 +14,9 @@ from nlsdesign.cli.main import program
 
 HEAVY = {"casadi", "numpy", "sympy", "control", "scipy", "matplotlib", "fmpy", "jinja2"}
 DECK = "austin2015_figure_consistent"
-SLOW_PARTS = {"scipy.signal", "scipy.stats", "scipy.integrate", "scipy.ndimage"}
+SLOW_PARTS = {f"scipy.{part}" for part in (
+    "signal", "stats", "integrate", "ndimage", "interpolate", "optimize", "sparse", "special",
+)}  # fmt: skip
 """Of SciPy, up to half a second each, which SciPy loads at their first use."""
 AT_THE_END = f"""
 import atexit, sys

@@ -16,8 +16,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import BSpline
-from scipy.optimize import lsq_linear
+import scipy
 
 from ....components import Assembly, Element, Parallel, UnnamedFriction, UnnamedSpring
 from ....components.core.domain import Domain
@@ -247,7 +246,7 @@ def _basis(motion: Array, low: float, high: float, spans: int) -> Array:
     step = (high - low) / spans
     knots = low + step * np.arange(-3, spans + 4)
     inside = np.clip(motion, low, high - 1e-9 * step)
-    result: Array = BSpline.design_matrix(inside, knots, 3).toarray()
+    result: Array = scipy.interpolate.BSpline.design_matrix(inside, knots, 3).toarray()
     return result
 
 
@@ -378,7 +377,7 @@ class _Regression:
             vector += every[keep].T @ target[keep]
         strength, axes = np.linalg.eigh(matrix)
         root = np.sqrt(np.maximum(strength, 1e-13 * strength[-1]))
-        result: Array = lsq_linear(
+        result: Array = scipy.optimize.lsq_linear(
             root[:, None] * axes.T, (axes.T @ vector) / root, bounds=self._bounds, method="bvls"
         ).x
         return result

@@ -19,8 +19,8 @@ from contextlib import suppress
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
@@ -203,11 +203,7 @@ def _without(information: Array, pull: Array, gradient: Array, place: tuple[Arra
     strength, axes = np.linalg.eigh(information)
     root = np.sqrt(np.maximum(strength, _LEAST_INFORMATION))
     target = -(axes.T @ left) / root
-    step = lsq_linear(
-        root[:, None] * axes.T,
-        target,
-        (np.minimum(low - x, -1e-12), np.maximum(high - x, 1e-12)),
-        method="bvls",
-    ).x
+    walls = np.minimum(low - x, -1e-12), np.maximum(high - x, 1e-12)
+    step = scipy.optimize.lsq_linear(root[:, None] * axes.T, target, walls, method="bvls").x
     moved: Array = np.clip(x + step, low, high)
     return moved

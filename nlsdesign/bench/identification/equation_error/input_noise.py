@@ -26,8 +26,8 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
 
 from ....foundation.arrays import Array
 from ..filters import derivative
@@ -157,7 +157,7 @@ class _Signal(NamedTuple):
             for beside in _BESIDE:
                 whole = rows.share / (level * behind[0.0][0, 0]) * own + (others + beside) * np.eye(len(own))
                 factor = np.linalg.cholesky(whole)
-                whitened = solve_triangular(factor, rows.left, lower=True)
+                whitened = scipy.linalg.solve_triangular(factor, rows.left, lower=True)
                 likelihood = -0.5 * float(whitened @ whitened) - float(np.sum(np.log(np.diag(factor))))
                 if likelihood - 0.5 * fit.deviance > best:
                     best = likelihood - 0.5 * fit.deviance

@@ -23,7 +23,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
-from scipy.optimize import nnls
+import scipy
 
 from ....foundation.arrays import Array
 from ....foundation.symbolic import remembered
@@ -173,7 +173,7 @@ def _fitted(
     for _ in range(_ROUNDS):
         # Relative errors count: a periodogram scatters in proportion to its mean.
         weights = np.sqrt(count) / model
-        solution, _ = nnls(columns * weights[:, None], density * weights)
+        solution, _ = scipy.optimize.nnls(columns * weights[:, None], density * weights)
         model = np.maximum(columns @ solution, 1e-12 * density.max())
     parts = tuple(NoisePart(float(v), t) for v, t in zip(solution[1:], times, strict=True) if v > 0.0)
     return float(solution[0]), parts
@@ -219,7 +219,7 @@ def _one_process(coloured: Array, density: Array, count: Array) -> OneProcess:
     columns, model = np.column_stack([np.ones_like(density), coloured]), density
     for _ in range(_ROUNDS):
         weights = np.sqrt(count) / model
-        solution, _ = nnls(columns * weights[:, None], density * weights)
+        solution, _ = scipy.optimize.nnls(columns * weights[:, None], density * weights)
         model = np.maximum(columns @ solution, 1e-12 * density.max())
     # A median knows as much as ln²2 of the numbers that it is taken from.
     off = np.log(np.maximum(density, 1e-300) / model)

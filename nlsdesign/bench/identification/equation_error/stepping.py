@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+import scipy
 
 from ....foundation.symbolic import Expression
 
@@ -55,7 +55,7 @@ def stages_of(derivative: Expression, state: Expression, moving: Expression) -> 
     """Return the stages, earlier ones first."""
     n = state.numel()
     coupled = np.array([[ca.depends_on(derivative[i], state[j]) for j in range(n)] for i in range(n)])
-    count, label = connected_components(coupled, directed=True, connection="strong")
+    count, label = scipy.sparse.csgraph.connected_components(coupled, directed=True, connection="strong")
     groups = [[i for i in range(n) if label[i] == k] for k in range(count)]
     acts_on = {
         k: {m for m in range(count) if m != k and coupled[np.ix_(groups[m], groups[k])].any()}

@@ -18,8 +18,6 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from scipy.interpolate import make_interp_spline
-from scipy.optimize import minimize_scalar
 
 from ....foundation.arrays import Array, Indices
 from ....foundation.errors import MeasurementError, ValueRangeError
@@ -149,7 +147,7 @@ def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
     named = f"{channel.name} {1.0 / own:.4g} -> {1.0 / step:.4g} Hz"
     slower = step > own * (1.0 + _SAME)
     if not slower:
-        interpolated: Array = make_interp_spline(channel.time, channel.values, k=3)(time)
+        interpolated: Array = scipy.interpolate.make_interp_spline(channel.time, channel.values, k=3)(time)
         same = channel.even and abs(step / own - 1.0) < _SAME and _on_samples(channel.time, time)
         return (
             (channel.values[_nearest(channel.time, time)], "")
@@ -170,7 +168,7 @@ def _resampled(channel: Channel, time: Array, step: float) -> tuple[Array, str]:
     padded = np.pad(values, half, mode="reflect", reflect_type="odd")
     smooth: Array = scipy.signal.fftconvolve(padded, taps, mode="valid")
     change = f"{named} with an anti-alias filter" + ("" if channel.even else ", uneven steps interpolated")
-    return make_interp_spline(even, smooth, k=3)(np.minimum(time, even[-1])), change
+    return scipy.interpolate.make_interp_spline(even, smooth, k=3)(np.minimum(time, even[-1])), change
 
 
 def _nearest(time: Array, wanted: Array) -> Indices:
@@ -300,7 +298,7 @@ def _overlap(delayed: Channel, reference: Channel, shift: float) -> tuple[Array,
     """Return the delayed channel moved by a shift, its rate, and the reference, where both run."""
     times = reference.time
     inside = (times + shift >= delayed.time[0]) & (times + shift <= delayed.time[-1])
-    spline = make_interp_spline(delayed.time, delayed.values, k=3)
+    spline = scipy.interpolate.make_interp_spline(delayed.time, delayed.values, k=3)
     at = times[inside] + shift
     return spline(at), spline.derivative()(at), reference.values[inside]
 
@@ -311,7 +309,7 @@ def _at(delayed: Channel, reference: Channel, shift: float) -> float:
 
 
 def _refined(delayed: Channel, reference: Channel, lag: float, step: float) -> float:
-    optimum = minimize_scalar(
+    optimum = scipy.optimize.minimize_scalar(
         lambda shift: -_at(delayed, reference, shift),
         bounds=(lag - step, lag + step),
         method="bounded",

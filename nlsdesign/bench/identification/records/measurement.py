@@ -16,7 +16,7 @@ from typing import Literal
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.csv_tables import heads_with_units
@@ -276,7 +276,8 @@ class Record:
             noise, quantum = self.resolution_of(name)
             resolution[name] = Resolution(share * noise, share * quantum)
             sound = ~self.masked_in([name])
-            signals[name] = make_interp_spline(clock[sound], self.at_samples(name)[sound], k=5)(finer)
+            spline = scipy.interpolate.make_interp_spline(clock[sound], self.at_samples(name)[sound], k=5)
+            signals[name] = spline(finer)
         below, above = np.floor(finer).astype(int), np.ceil(finer).astype(int)
         return replace(
             self,

@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import schur
 
 from ....foundation.arrays import Array, Mask
 from ....foundation.errors import ConvergenceError, ValueRangeError, unknown_name
@@ -114,7 +114,7 @@ class LinearLoop:
     @cached_property
     def _triangular(self) -> tuple[Complex, Complex]:
         """Schur form of A: a response at many frequencies then takes back substitution only."""
-        pairs = [schur(matrix, output="complex") for matrix in self.a]
+        pairs = [scipy.linalg.schur(matrix, output="complex") for matrix in self.a]
         return np.array([t for t, _ in pairs]), np.array([q for _, q in pairs])
 
 
@@ -153,8 +153,8 @@ def plant_of(system: SampledSystem, angles: Array, speed: float) -> LinearPlant:
     wired = [s.removeprefix(start) for s in system.sources.values() if s.startswith(start)]
     spring = series_spring(system.plant)
     signals = [*wired, spring.effort, spring.motion]
-    signals = [name for name in dict.fromkeys(signals) if name != system.driven]
-    return linear_plant(system.plant, angles, driven=str(system.driven), signals=tuple(signals), speed=speed)
+    shown = tuple(name for name in dict.fromkeys(signals) if name != system.driven)
+    return linear_plant(system.plant, tuple(angles), driven=str(system.driven), signals=shown, speed=speed)
 
 
 def assembled(

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
@@ -40,6 +40,7 @@ _FOLLOWS: dict[tuple[object, ...], str] = {
 }
 
 
+@remembered(64)
 def with_fine_counts(model: FlatModel) -> FlatModel:
     """Return a copy of a model in which no reading is rounded.
 
@@ -116,15 +117,16 @@ class LinearPlant:
         whole[:, :states, :states] = step * self.a
         whole[:, :states, states : states + inputs] = step * self.b
         whole[:, states + 1 : states + inputs, states + inputs :] = np.eye(others)
-        power = expm(whole)
+        power = scipy.linalg.expm(whole)
         top = power[:, :states]
         slope = top[:, :, states + inputs :]
         constant = top[:, :, states + 1 : states + inputs]
         return top[:, :, :states], top[:, :, states : states + 1], constant - slope, slope
 
 
+@remembered(32)
 def linear_plant(
-    plant: FlatModel, angles: Array, *, driven: str, signals: tuple[str, ...], speed: float
+    plant: FlatModel, angles: tuple[float, ...], *, driven: str, signals: tuple[str, ...], speed: float
 ) -> LinearPlant:
     """Linearise a plant at rest at many angles of its driven body.
 
@@ -147,7 +149,7 @@ def linear_plant(
             ca.jacobian(shown, s.state), _by(shown, s.input, places), shown, s.derivative[rate], u[0],
         )],
     )  # fmt: skip
-    rest = rest_states(plant, angles, unmoved=True)
+    rest = rest_states(plant, np.asarray(angles), unmoved=True)
     p, start = plant.start(plant.parameters), plant.start(plant.inputs)
     drive = _holding(function, rest, (start, p), places[0])
     inputs = np.tile(start, (len(angles), 1))

@@ -23,7 +23,7 @@ from itertools import pairwise
 
 import casadi as ca
 import numpy as np
-from scipy.optimize import minimize_scalar
+import scipy
 
 from ....foundation.arrays import Array, Indices
 from ....model import FlatModel
@@ -329,8 +329,8 @@ def _frequency_of_sine(values: Array) -> float | None:
         return float(np.sum(rest**2))
 
     width = 1.0 / len(values)
-    best = minimize_scalar(left, bounds=(max(start - width, 1e-9), start + width), method="bounded",
-                               options={"xatol": 1e-9})  # fmt: skip
+    bounds, options = (max(start - width, 1e-9), start + width), {"xatol": 1e-9}
+    best = scipy.optimize.minimize_scalar(left, bounds=bounds, method="bounded", options=options)
     return float(best.x) if best.fun < 1e-6 * power else None
 
 

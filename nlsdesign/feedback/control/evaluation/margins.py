@@ -98,11 +98,9 @@ def loop_margins(
     opening = opening or current
     if opening == loop.desired:
         compared = _compared_only(loop)
-        plain = (
-            closed
-            if compared is loop
-            else linear_loop(compared, angles, speed=speed, frozen_tables=frozen_tables)
-        )
+        plain = closed
+        if compared is not loop:
+            plain = linear_loop(compared, angles, speed=speed, frozen_tables=frozen_tables)
         followed = plain.response(loop.estimate, loop.desired, frequencies)
         followed[~closed.stable()] = 0.0  # has no margins; neither has a loop that does not rest
         gain = followed / (1.0 - followed)
@@ -110,10 +108,9 @@ def loop_margins(
         opened = linear_loop(loop, angles, opened=(opening,), speed=speed, frozen_tables=frozen_tables)
         system = loop.system([loop.desired])
         last = list(system.blocks)[-1]
-        source = f"{last}.{system.blocks[last].outputs[0].name}"
-        gain = -opened.response(
-            source if opening == current else system.sources[opening], opening, frequencies
-        )
+        command = f"{last}.{system.blocks[last].outputs[0].name}"
+        source = command if opening == current else system.sources[opening]
+        gain = -opened.response(source, opening, frequencies)
         if opening == current:
             # The opening lies behind the samples in which a computed current waits.
             gain *= np.exp(-2j * math.pi * frequencies * loop.sample_time * loop.delay)

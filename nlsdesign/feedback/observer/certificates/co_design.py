@@ -14,7 +14,7 @@ from typing import NamedTuple, TypeVar
 
 import clarabel
 import numpy as np
-from scipy import sparse
+import scipy
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError
@@ -49,8 +49,8 @@ def minimised(cost: Array, inequalities: Sequence[Inequality]) -> Array | None:
     settings.verbose = False
     count = len(cost)
     solver = clarabel.DefaultSolver(
-        sparse.csc_matrix((count, count)), np.asarray(cost, dtype=float), sparse.csc_matrix(np.vstack(rows)),
-        np.concatenate(sides), cones, settings,
+        scipy.sparse.csc_matrix((count, count)), np.asarray(cost, dtype=float),
+        scipy.sparse.csc_matrix(np.vstack(rows)), np.concatenate(sides), cones, settings,
     )  # fmt: skip
     solution = solver.solve()
     x = np.array(solution.x)

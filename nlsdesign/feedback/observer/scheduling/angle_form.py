@@ -19,7 +19,7 @@ from typing import NamedTuple, Protocol
 
 import casadi as ca
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
+import scipy
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ArrangementError, ValueRangeError, unknown_name
@@ -281,7 +281,7 @@ class AngleForm:
         """Return Q(θ), shape (N, inner)."""
         return np.zeros((len(angles), self.inner)) if self._sum is None else self._sum(angles)
 
-    def _summed(self) -> CubicHermiteSpline | None:
+    def _summed(self) -> scipy.interpolate.CubicHermiteSpline | None:
         """Return Q = ∫₀^θ ∂ż/∂ω dθ as a spline with its exact slope at fine nodes, zero among them."""
         low, high = min(0.0, float(self.layout.angles[0])), max(0.0, float(self.layout.angles[-1]))
         if not self.inner or not np.any(self._followed(np.linspace(low, high, 7))):
@@ -291,7 +291,8 @@ class AngleForm:
         slopes = self._followed(FINE / 2.0 * np.arange(-2.0 * below, 2.0 * above + 1.0))
         parts = (slopes[:-2:2] + 4.0 * slopes[1:-1:2] + slopes[2::2]) * (FINE / 6.0)
         whole = np.vstack([np.zeros((1, self.inner)), np.cumsum(parts, axis=0)])
-        return CubicHermiteSpline(np.arange(-below, above + 1) * FINE, whole - whole[below], slopes[::2])
+        nodes = np.arange(-below, above + 1) * FINE
+        return scipy.interpolate.CubicHermiteSpline(nodes, whole - whole[below], slopes[::2])
 
 
 def _moving(x: Array, place: int, speed: float) -> Array:

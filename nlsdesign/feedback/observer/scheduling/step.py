@@ -17,8 +17,8 @@ from typing import NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import casadi as ca
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ValueRangeError, unknown_name
@@ -63,8 +63,8 @@ def _exponentials(blocks: Array) -> Array:
         and len(blocks) > 1
         and np.array_equal(blocks, np.broadcast_to(blocks[0], blocks.shape))
     ):
-        return np.broadcast_to(expm(blocks[0]), blocks.shape).copy()
-    result: Array = expm(blocks)
+        return np.broadcast_to(scipy.linalg.expm(blocks[0]), blocks.shape).copy()
+    result: Array = scipy.linalg.expm(blocks)
     return result
 
 
@@ -334,7 +334,7 @@ class PolePlacement:
                 f"poles {self.poles}", f"are not in pairs of what is seen at {plant.angle:g} rad",
                 next_step="give complex poles in pairs, and a real one for each state that may not be seen",
             )  # fmt: skip
-        step = expm(seen.T @ a @ seen * time) - np.eye(len(moved))
+        step = scipy.linalg.expm(seen.T @ a @ seen * time) - np.eye(len(moved))
         placed, slopes = _ackermann(step, c @ seen, np.expm1(poles[moved] * time))
         gain: Spectrum = np.zeros((1 + len(chain), *output.T.shape), dtype=np.complex128)
         gain[np.ix_([0], chain, [0])] = (scale * (seen @ placed))[None, :, None]
