@@ -27,6 +27,7 @@ from ..model.flat import Symbols, stated_equations
 from ..model.graph import applied, as_results, fold, read_graph
 from ..model.readings import reading_of
 from ..model.roles import contour_ends, declared_reading, motor_of, with_declared_reading
+from ..model.transform import with_products
 
 if TYPE_CHECKING:
     from ..export import WatchedBlock, WatchPlan
@@ -443,7 +444,7 @@ def _residual_model(
         *[f.seen for f in filters.values() for _ in range(4)], *[ca.SX.zeros(i.numel()) for i in inner]
     )
     arguments = [state, readings, ca.SX(0, 1), table]
-    return FlatModel(
+    written = FlatModel(
         name=f"{model.name}_residuals",
         description=f"Efforts that readings of {model.name} leave, and what changes add",
         states=tuple(states),
@@ -459,6 +460,7 @@ def _residual_model(
         begin=ca.Function("begin", arguments, [begun, begun]),
         origin=model.origin,
     )
+    return with_products(written)
 
 
 def _largest_drive(model: FlatModel, *, of_effort: bool = True) -> float:
