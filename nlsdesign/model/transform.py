@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -192,10 +192,11 @@ def with_parts(model: FlatModel, parts: ModelParts) -> FlatModel:
 def with_products(model: FlatModel) -> FlatModel:
     """Return a sampled model that multiplies by the inverse of a constant instead of dividing by it.
 
-    On a controller a division takes as long as a dozen products, and no compiler may replace it: digits change.
+    On a controller a division takes as long as a dozen products. No compiler may replace it: digits change.
     """
-    functions = {name: getattr(model, name) for name in ("equations", "begin", "expected")}
-    return replace(model, **{name: _multiplying(f) for name, f in functions.items() if f is not None})
+    names = [name for name in ("equations", "begin", "expected") if getattr(model, name) is not None]
+    functions: dict[str, Any] = {name: _multiplying(getattr(model, name)) for name in names}
+    return replace(model, **functions)
 
 
 # --- inside ---------------------------------------------------------------------------------------

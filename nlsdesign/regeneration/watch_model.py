@@ -405,7 +405,7 @@ def watch_plan(model: FlatModel, sample_time: float = 1e-3) -> WatchPlan:
     known = [f"{n.partition('.')[0]}.{NOTICED[last][0]}" for n, last in lasts.items() if last in NOTICED]
     shown = {name for block in watched for name in block.changes}
     unseen = tuple(name for name in dict.fromkeys(known) if name not in shown)
-    residuals = _residual_model(model, watched, told, filters, sample_time)
+    residuals = with_products(_residual_model(model, watched, told, filters, sample_time))
     return WatchPlan(residuals, tuple(watched), settling, unseen=unseen)
 
 
@@ -444,7 +444,7 @@ def _residual_model(
         *[f.seen for f in filters.values() for _ in range(4)], *[ca.SX.zeros(i.numel()) for i in inner]
     )
     arguments = [state, readings, ca.SX(0, 1), table]
-    written = FlatModel(
+    return FlatModel(
         name=f"{model.name}_residuals",
         description=f"Efforts that readings of {model.name} leave, and what changes add",
         states=tuple(states),
@@ -460,7 +460,6 @@ def _residual_model(
         begin=ca.Function("begin", arguments, [begun, begun]),
         origin=model.origin,
     )
-    return with_products(written)
 
 
 def _largest_drive(model: FlatModel, *, of_effort: bool = True) -> float:
