@@ -110,12 +110,16 @@ def written(name: str, model: FlatModel, folder: Path, real: str, *, quick_monit
     return export_c(model, folder, real=real, name="step")
 
 
+def generated_files(source: CSource) -> list[Path]:
+    """Return the C that a user compiles, without what makes one step of it here."""
+    own = {"watched": ["watch.c", "watch_residuals.c"], "supervised": ["step.c"]}.get(source.name)
+    return [source.header.parent / name for name in own] if own else [source.source]
+
+
 def self_test_passes(source: CSource) -> bool:
     """Compile and run the self-test that was written beside the code."""
-    folder = source.selftest.parent
-    own = {"watched": ["watch.c", "watch_residuals.c"], "supervised": ["step.c"]}.get(source.name)
-    files = [folder / name for name in own] if own else [source.source]
-    program = compile_program([source.selftest, *files], folder / "self_test", flags=["-std=c99"])
+    files = [source.selftest, *generated_files(source)]
+    program = compile_program(files, source.selftest.parent / "self_test", flags=["-std=c99"])
     return subprocess.run([program], check=False, capture_output=True).returncode == 0
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import accumulate, pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -17,7 +17,7 @@ import numpy as np
 from ..foundation.errors import ArrangementError, unknown_name
 from ..foundation.symbolic import Expression, dependence, depends
 from .flat import INTERFACE, FlatModel, Switching, Symbols, Variable
-from .graph import applied
+from .graph import applied, as_results, fold, read_graph
 from .structure import ModelParts
 
 
@@ -189,6 +189,16 @@ def with_parts(model: FlatModel, parts: ModelParts) -> FlatModel:
     return replace(model, bodies=kept.bodies, springs=kept.springs, readings=kept.readings)
 
 
+def with_products(model: FlatModel) -> FlatModel:
+    """Return a sampled model that multiplies by the inverse of a constant instead of dividing by it.
+
+    On a controller a division takes as long as a dozen products. No compiler may replace it: digits change.
+    """
+    names = [name for name in ("equations", "begin", "expected") if getattr(model, name) is not None]
+    functions: dict[str, Any] = {name: _multiplying(getattr(model, name)) for name in names}
+    return replace(model, **functions)
+
+
 # --- inside ---------------------------------------------------------------------------------------
 
 
@@ -242,6 +252,20 @@ def _switching(model: FlatModel, again: Callable[[Symbols], Symbols] | None) -> 
     output, signal = shown.call(given)
     s = again(s._replace(output=output, signal=signal))
     return replace(model.switching, shown=ca.Function("shown", given, [s.output, s.signal]))
+
+
+def _multiplying(function: ca.Function) -> ca.Function:
+    """Return a function without divisions by constants, but for those whose inverse no float may hold."""
+
+    def combined(operation: int, operands: Sequence[Expression]) -> Expression:
+        if operation == ca.OP_DIV and operands[1].is_constant() and 1e-30 < abs(float(operands[1])) < 1e30:
+            return operands[0] * (1.0 / float(operands[1]))
+        return applied(operation, operands)
+
+    given = function.sx_in()
+    values = fold(read_graph(function), lambda i, k: given[i].nz[k], ca.SX, combined=combined)
+    results = as_results(function, values)
+    return ca.Function(function.name(), given, results, function.name_in(), function.name_out())
 
 
 def _column(items: Iterable[Expression]) -> Expression:

@@ -27,6 +27,7 @@ from ..model.flat import Symbols, stated_equations
 from ..model.graph import applied, as_results, fold, read_graph
 from ..model.readings import reading_of
 from ..model.roles import contour_ends, declared_reading, motor_of, with_declared_reading
+from ..model.transform import with_products
 
 if TYPE_CHECKING:
     from ..export import WatchedBlock, WatchPlan
@@ -404,7 +405,7 @@ def watch_plan(model: FlatModel, sample_time: float = 1e-3) -> WatchPlan:
     known = [f"{n.partition('.')[0]}.{NOTICED[last][0]}" for n, last in lasts.items() if last in NOTICED]
     shown = {name for block in watched for name in block.changes}
     unseen = tuple(name for name in dict.fromkeys(known) if name not in shown)
-    residuals = _residual_model(model, watched, told, filters, sample_time)
+    residuals = with_products(_residual_model(model, watched, told, filters, sample_time))
     return WatchPlan(residuals, tuple(watched), settling, unseen=unseen)
 
 

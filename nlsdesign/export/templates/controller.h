@@ -13,7 +13,8 @@ extern "C" {
 #define @NAME@_INTERFACE_VERSION @interface@ /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
-   set_parameters) as numbered below; bit 30 stands for all from 14 on. */
+   set_parameters) as numbered below; bit 30 stands for all from 14 on: of these the refused parameters are those
+   that differ from the state's afterwards. */
 @bits@
 
 @inputs@

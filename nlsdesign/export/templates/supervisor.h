@@ -22,12 +22,15 @@ static inline float @name@_supervise(@name@_supervisor *supervisor, uint32_t sta
     const uint32_t grave = @NAME@_STATE_RESTARTED | @NAME@_INPUT_STALE;
     const uint32_t faulty = @NAME@_INPUT_HELD | @NAME@_INPUT_OUT_OF_RANGE | @NAME@_INPUT_JUMPED | @NAME@_OUTPUT_HELD;
     const uint32_t absent = @NAME@_WAITING | @NAME@_NOT_STARTED;
+    const uint32_t steps = @NAME@_CUT_AFTER - @NAME@_DERATE_AFTER;
     float share = 1.0f;
 
     if ((status & faulty) != 0u) {
         supervisor->faulty = supervisor->faulty + 1u;
     } else if (supervisor->faulty > 0u) {
         supervisor->faulty = supervisor->faulty - 1u;
+    } else {
+        /* clean for long */
     }
     if ((status & grave) != 0u || supervisor->faulty >= @NAME@_CUT_AFTER) {
         supervisor->faulty = 0u;
@@ -36,7 +39,11 @@ static inline float @name@_supervise(@name@_supervisor *supervisor, uint32_t sta
     if (supervisor->cut != 0u || (status & absent) != 0u) {
         share = 0.0f;
     } else if (supervisor->faulty > @NAME@_DERATE_AFTER) {
-        share = (float)(@NAME@_CUT_AFTER - supervisor->faulty) / (float)(@NAME@_CUT_AFTER - @NAME@_DERATE_AFTER);
+        const uint32_t remaining = @NAME@_CUT_AFTER - supervisor->faulty;
+
+        share = (float)remaining / (float)steps;
+    } else {
+        /* the whole command acts */
     }
     return share;
 }

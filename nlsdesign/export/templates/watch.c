@@ -73,11 +73,12 @@ static void fill(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments
 /* Solves for one more change: a step of Gauss and Jordan in place, in two halves. */
 static void sweep(@real@ (*work)[@NAME@_MOST + 1u], uint32_t pivot, uint32_t half)
 {
-    const uint32_t end = (half == 0u) ? HALF : (@NAME@_MOST + 1u);
+    uint32_t end = @NAME@_MOST + 1u;
 
     if (half == 0u) {
         const @real@ inverse = @one@ / work[pivot][pivot];
 
+        end = HALF;
         for (uint32_t j = 0u; j <= @NAME@_MOST; ++j) {
             work[pivot][j] *= inverse;
         }
@@ -183,10 +184,11 @@ static void finish(@name@_state *state, uint32_t number, @real@ temperature)
     if (way != 0u && block->least_speed > @zero@) {
         way = (from->forward == 0u) ? BACKWARD : ((from->forward == @NAME@_LENGTH) ? FORWARD : 0u);
     }
-    from->fresh = (way != 0u && from->before == way && from->earlier == way) ? 1u : 0u;
-    if (from->fresh != 0u) {
+    from->fresh = 0u;
+    if (way != 0u && from->before == way && from->earlier == way) {
         @real@ residual = from->held[@NAME@_MOST];
 
+        from->fresh = 1u;
         for (uint32_t i = 0u; i < @NAME@_MOST; ++i) {
             from->mean[i] = from->held[i];
             residual -= reference[i] * from->held[i];
@@ -196,7 +198,9 @@ static void finish(@name@_state *state, uint32_t number, @real@ temperature)
     }
     from->earlier = from->before;
     from->before = way;
-    from->bin = (speed > block->speeds[1]) ? 2u : ((speed > block->speeds[0]) ? 1u : 0u);
+    from->bin = 0u;
+    from->bin += (speed > block->speeds[0]) ? 1u : 0u;
+    from->bin += (speed > block->speeds[1]) ? 1u : 0u;
     from->bin += (from->sum[@NAME@_MOST + 2u] * @share@ > block->load) ? 3u : 0u;
     from->bin += (temperature > @warm@) ? 6u : 0u;
     for (uint32_t i = 0u; i <= @NAME@_MOST; ++i) {
@@ -285,15 +289,20 @@ void @name@_init(@name@_state *state)
 
 uint32_t @name@_commission(@name@_state *state)
 {
-    uint32_t enough = (state->started == STARTED) ? 1u : 0u;
+    uint32_t enough = 0u;
 
+    if (state->started == STARTED) {
+        enough = 1u;
+    }
     for (uint32_t number = 0u; number < @NAME@_BLOCKS && enough != 0u; ++number) {
         @real@ count = @zero@;
 
         for (uint32_t bin = 0u; bin < @NAME@_BINS; ++bin) {
             count += state->record.bins[number][bin].count;
         }
-        enough = (count >= @enough@) ? 1u : 0u;
+        if (!(count >= @enough@)) {
+            enough = 0u;
+        }
     }
     for (uint32_t number = 0u; number < @NAME@_BLOCKS && enough != 0u; ++number) {
         const uint32_t changes = numbers[number].changes;
@@ -341,9 +350,10 @@ void @name@_seal(@name@_record *record)
         @half_bytes@
     };
     const unsigned char *const bytes = (const unsigned char *)record;
+    const size_t end = offsetof(@name@_record, checksum);
     uint32_t sum = 0xffffffffu;
 
-    for (size_t i = 0u; i < offsetof(@name@_record, checksum); ++i) {
+    for (size_t i = 0u; i < end; ++i) {
         sum ^= bytes[i];
         sum = (sum >> 4u) ^ of_half_byte[sum & 15u];
         sum = (sum >> 4u) ^ of_half_byte[sum & 15u];

@@ -19,7 +19,8 @@ extern "C" {
 #define SCHEDULED_DAMPER_INTERFACE_VERSION 0xa012fa8bu /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
-   set_parameters) as numbered below; bit 30 stands for all from 14 on. */
+   set_parameters) as numbered below; bit 30 stands for all from 14 on: of these the refused parameters are those
+   that differ from the state's afterwards. */
 #define SCHEDULED_DAMPER_INPUT_HELD 0x1u /* an input was not finite; its last good value, or what was expected, was used */
 #define SCHEDULED_DAMPER_INPUT_SATURATED 0x2u /* a command was outside its range, the limit was used */
 #define SCHEDULED_DAMPER_STATE_RESTARTED 0x4u /* the next state was not finite; the next sample begins anew from its readings */

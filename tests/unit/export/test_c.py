@@ -336,6 +336,24 @@ def test_parameters_are_taken_at_run_time_or_refused(running):
     assert running("observer", "double", [3.0, 0.015, 0.2]).first_status == PARAMETER_REFUSED | index_bit(0)
 
 
+def test_refused_parameters_that_share_a_bit_are_those_the_state_differs_in(tmp_path):
+    u, p, nothing = ca.SX.sym("u"), ca.SX.sym("p", 20), ca.SX(0, 1)
+    arguments = [ca.SX.sym("t"), nothing, u, p, nothing]
+    equations = ca.Function("e", arguments, [nothing, ca.vertcat(u, p), nothing, nothing])
+    names = [f"p{i}" for i in range(20)]
+    model = FlatModel(
+        "many", "Shows its parameters", (), (Variable("u", "1", "Input"),),
+        tuple(Variable(name, "1", "Number", 1.0, 1.0, 0.0, 2.0) for name in names),
+        tuple(Variable(f"y{i}", "1", "Shown") for i in range(21)), (), equations, 0.1,
+    )  # fmt: skip
+    source = export_c(model, tmp_path)
+    step, given = CompiledStep(source), [1.5] * 20
+    given[15], given[18] = 3.0, math.nan
+    assert step.set_parameters(given) == PARAMETER_REFUSED | index_bit(14) == PARAMETER_REFUSED | 1 << 30
+    assert [i for i, v in enumerate(step([0.0])[0][1:]) if v != given[i]] == [15, 18]
+    assert "that differ from the state's afterwards" in source.header.read_text()
+
+
 @pytest.mark.long_cases(
     "0-double", "1-double", "1-float", "127-double", "165-double", "165-float", "255-float"
 )
@@ -549,6 +567,8 @@ def test_the_self_test_allows_what_the_rounding_of_the_states_makes_and_no_more_
     source = export_c(loop, tmp_path, real="float")
     program = compile_program([source.source, source.selftest], tmp_path / "selftest")
     assert subprocess.run([program], check=False).returncode == 0
+    # A division costs as much as a dozen products, and eight of them had a constant below.
+    assert re.findall(r" / -?[0-9.e+-]+f\b", source.source.read_text()) == []
     # A slow state that is wrong by a hundredth of its size is found.
     names = [v.name for v in loop.outputs]
     place = names.index("correction.factor[2]")

@@ -200,6 +200,7 @@ def test_what_cannot_be_played_is_one_sentence(source: CSource, record: Path, tm
         ((record, "--udp", "nowhere"), "is no ADDRESS:PORT"),
         ((record, "--serial", str(tmp_path / "tty")), "cannot be opened"),
         ((record, *wire), "the board does not answer to sample 0"),
+        (("--log", broken), "holds no whole frame of this code"),
     ):
         done = play(source, *words)
         assert done.returncode == 2, words

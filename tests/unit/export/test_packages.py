@@ -65,6 +65,7 @@ def test_the_manifest_of_platformio_has_what_its_schema_asks_for(package: Path) 
     manifest = json.loads((package / "library.json").read_text(encoding="utf-8"))
     assert (manifest["name"], manifest["headers"]) == ("step", "step.h")
     assert (package / manifest["build"]["srcDir"] / "step.c").is_file()
+    assert "-lm" in manifest["build"]["flags"]  # the platform "native" links without libm by itself
     assert all((package / each["base"] / each["files"][0]).is_file() for each in manifest["examples"])
     parser = pytest.importorskip("platformio.package.manifest.parser")
     schema = pytest.importorskip("platformio.package.manifest.schema").ManifestSchema()

@@ -14,6 +14,7 @@ from ....foundation.errors import ArrangementError, ValueRangeError
 from ....foundation.symbolic import remembered
 from ....model import FlatModel, Variable
 from ....model.roles import declared_reading, series_spring, with_declared_reading
+from ....model.transform import with_products
 from .known_drive import KnownDrive, torque_range, torques_by_current, voltage_is_limited
 from .law_writer import DESIRED, LawWriter
 from .law_writer import LoopNames as LoopNames
@@ -175,7 +176,7 @@ def torque_controller(
     )  # fmt: skip
     supply = "" if voltage_is_limited(drive) else "; no voltage is limited, for the motor declares no winding"
     description = f"{outer.title} around a velocity loop{reason}{supply}"
-    model = writer.model("torque_controller", description, (output, motor.current))
+    model = with_products(writer.model("torque_controller", description, (output, motor.current)))
     inputs = [with_declared_reading(v, plant, v.name) if v.name == names.angle else v for v in model.inputs]
     return with_command_limits(replace(model, inputs=tuple(inputs)), plant)
 

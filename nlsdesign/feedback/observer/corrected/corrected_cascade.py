@@ -16,6 +16,7 @@ from ....foundation.symbolic import remembered
 from ....foundation.written_numbers import prefixed
 from ....model import FlatModel, Variable
 from ....model.roles import measured_motion, spring_torque
+from ....model.transform import with_products
 from ....simulation.prior import Prior, declared_prior
 from ..scheduling.angle_form import minimal_form
 from ..scheduling.scheduled import MEMORY, ObserverDesign, design_observer_with_details, whole_contour
@@ -232,7 +233,7 @@ def corrected(
     limit = None if safe is None or drive.maximum is None else (safe, drive.maximum)
     equations = CorrectionEquations(cascade, balance, rounding=rounding, limit=limit)
     design = CorrectedDesign(_Variables(equations).flat(), cascade, balance)
-    return replace(design, model=design.model.with_values(design.start(0.0)))
+    return replace(design, model=with_products(design.model).with_values(design.start(0.0)))
 
 
 def encoder_quantum(model: FlatModel, measured: str) -> float:

@@ -27,6 +27,7 @@ from ....foundation.symbolic import Expression, remembered
 from ....model import FlatModel, Variable
 from ....model.flat import stated_equations
 from ....model.roles import measured_motion, spring_torque
+from ....model.transform import with_products
 from .angle_form import Minimal, StateForm, plant_over
 from .measured_angle import measured_angle, with_plausible_inputs
 from .step import CascadeGain, FittedGain, GainRule, ObserverStep, speed_change
@@ -163,7 +164,7 @@ def design_observer_with_details(
         return ObserverDesign(with_plausible_inputs(flat, model, plant, compact.angles), step, compact)
 
     design = written(over.compact(step.entries, Draft(plant, written)))
-    return replace(design, model=design.model.with_values(design.start(0.0)))
+    return replace(design, model=with_products(design.model).with_values(design.start(0.0)))
 
 
 def check_sampling(model: FlatModel, sample_time: float) -> None:
