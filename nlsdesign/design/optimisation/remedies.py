@@ -8,7 +8,7 @@ Why no design keeps all limits: which are in conflict, how much each would have 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -38,9 +38,12 @@ class OtherSpring:
     words: str  # what it is
     machine: Assembly  # the actuator with it, not designed yet
     error: float  # rms torque error in N·m that is then left
+    freed: Freed | None = None  # what has to be freed besides
+    gives: tuple[Give, ...] = ()  # limits that would have to move besides
 
     def __str__(self) -> str:
-        return f"take {self.words}"
+        besides = [] if self.freed is None else [str(self.freed)]
+        return ", ".join([f"take {self.words}", *besides, *map(str, self.gives)])
 
 
 def percent(error: float, largest: float) -> str:
@@ -48,9 +51,16 @@ def percent(error: float, largest: float) -> str:
     return f"{100.0 * error / largest:.2g} % of the largest torque"
 
 
-def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...]:
-    """Return the other springs for which a cam was found within the limits."""
-    springs = []
+def other_springs(
+    search: Search, free: Sequence[str], allowed: float | None = None
+) -> tuple[OtherSpring, ...]:
+    """Return the other springs for which a cam was found within the limits.
+
+    Where none leaves less than the ``allowed`` error, the first that does with sizes freed besides stands
+    before them, or else the first that does with limits moved too.
+    """
+    springs: list[OtherSpring] = []
+    designs: list[tuple[Search, list[str], Array]] = []
     for words, machine in _others(search):
         try:
             question = search.question.of(machine)
@@ -64,7 +74,32 @@ def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...
         if outcomes:
             best = min(outcomes, key=lambda outcome: outcome.cost)
             springs.append(OtherSpring(words, machine, other.problem.rms(best.point)))
+            designs.append((other, kept, best.point))
+    if allowed is None or any(one.error <= allowed for one in springs):
+        return tuple(springs)
+    loosened = [Loosened(other, kept, largest_error=allowed, best=at) for other, kept, at in designs]
+    for more in (_with_sizes, _with_limits):
+        for spring, loose in zip(springs, loosened, strict=True):
+            if (enough := more(spring, loose)) is not None:
+                return (enough, *springs)
     return tuple(springs)
+
+
+def _with_sizes(spring: OtherSpring, loose: Loosened) -> OtherSpring | None:
+    """Return another spring with as few sizes freed as are enough; ``None`` where all are not."""
+    enough = loose.sizes_tried().enough
+    return replace(spring, error=enough[0].error, freed=enough[0]) if enough else None
+
+
+def _with_limits(spring: OtherSpring, loose: Loosened) -> OtherSpring | None:
+    """Return it with all sizes freed and limits moved, as little as is enough; ``None`` without sense."""
+    limits = [i for i in range(len(loose.bounds)) if i != loose.error]
+    outcome = loose.least(loose.candidates, limits)
+    gives = [loose.give(i, outcome) for i in limits if not _nothing(loose.give(i, outcome))]
+    if not outcome.solved or not all(give.sensible for give in gives):
+        return None
+    freed = loose.freed(loose.candidates, outcome)
+    return replace(spring, error=freed.error, freed=freed if freed.names else None, gives=tuple(gives))
 
 
 def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
@@ -211,7 +246,7 @@ def find_remedies(
     gives = tuple((give, also) for give, also in gives if not _nothing(give))
     if enough or gives:
         return Remedies(enough, tuple(better), gives, everything)
-    others = other_springs(search, free)
+    others = other_springs(search, free, allowed)
     return Remedies((), tuple(better), (), everything, others, hollow_contour(loose))
 
 
