@@ -59,6 +59,7 @@ from .optimisation.coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    PressedContact,
     RoomBetweenPivots,
 )
 from .optimisation.defaults import DesignSettings, safe_limits
@@ -164,6 +165,7 @@ __all__ = [
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
+    "PressedContact",
     "PretensionRange",
     "RestLengthRange",
     "RoomBetweenPivots",

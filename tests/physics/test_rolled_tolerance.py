@@ -1,7 +1,7 @@
-"""Edges that are cut wrong, rolled over by a circle or on themselves, against what the tolerance says of them.
+"""Edges that are cut wrong, rolled over by a circle or on themselves, against what the tolerance says.
 
-Nothing of the package's tolerance is used for the edge: each point is moved along its normal, and the centre of
-what rolls, its lever arm by differences and the torque of a spring follow from there.
+Nothing of the package's tolerance is used for the edge: each point is moved along its normal, and the centre
+of what rolls, its lever arm by differences and the torque of a spring follow from there.
 """
 
 from __future__ import annotations

@@ -204,7 +204,8 @@ def _rows(
     """Return the spreads that change the torque at rest, each with its change per standard deviation."""
     if design.cam.rolling is not None:
         raise ArrangementError(
-            f"cam '{design.cam.name}'", f"has {design.cam.rolling.what}, which goals over the spreads do not know",
+            f"cam '{design.cam.name}'",
+            f"has {design.cam.rolling.what}, which goals over the spreads do not know",
             next_step="leave them out; tolerance_analysis looks at the design that comes out",
         )  # fmt: skip
     causes = spring_causes(design.model, design.cam.drive, rules)
