@@ -27,6 +27,8 @@ _STARTS = 4
 _MOST = 1e3
 _HOLLOW = 1e-6
 """Radius of curvature below zero, relative to the size of the contour, from which it counts as hollow."""
+_SURE = 0.7
+"""Share of the allowed error that another spring is asked for, as the finished cam adds some between nodes."""
 _SHOWS = 0.01
 """Part of the deepest hollow from which a place is named."""
 
@@ -77,7 +79,8 @@ def other_springs(
             designs.append((other, kept, best.point))
     if allowed is None or any(one.error <= allowed for one in springs):
         return tuple(springs)
-    loosened = [Loosened(other, kept, largest_error=allowed, best=at) for other, kept, at in designs]
+    sure = _SURE * allowed
+    loosened = [Loosened(other, kept, largest_error=sure, best=at) for other, kept, at in designs]
     for more in (_with_sizes, _with_limits):
         for spring, loose in zip(springs, loosened, strict=True):
             if (enough := more(spring, loose)) is not None:
