@@ -28,7 +28,7 @@ _MOST = 1e3
 _HOLLOW = 1e-6
 """Radius of curvature below zero, relative to the size of the contour, from which it counts as hollow."""
 _SURE = 0.7
-"""Share of the allowed error that another spring is asked for, as the finished cam adds some between nodes."""
+"""Share of the allowed error that another spring is asked for: the finished cam adds some between nodes."""
 _SHOWS = 0.01
 """Part of the deepest hollow from which a place is named."""
 
@@ -59,7 +59,7 @@ def other_springs(
     """Return the other springs for which a cam was found within the limits.
 
     Where none leaves less than the ``allowed`` error, the first that does with sizes freed besides stands
-    before them, or else the first that does with limits moved too.
+    before them, or else the one that does with limits moved least.
     """
     springs: list[OtherSpring] = []
     designs: list[tuple[Search, list[str], Array]] = []
@@ -81,11 +81,12 @@ def other_springs(
         return tuple(springs)
     sure = _SURE * allowed
     loosened = [Loosened(other, kept, largest_error=sure, best=at) for other, kept, at in designs]
-    for more in (_with_sizes, _with_limits):
-        for spring, loose in zip(springs, loosened, strict=True):
-            if (enough := more(spring, loose)) is not None:
-                return (enough, *springs)
-    return tuple(springs)
+    for spring, loose in zip(springs, loosened, strict=True):
+        if (enough := _with_sizes(spring, loose)) is not None:
+            return (enough, *springs)
+    ways = [way for way in map(_with_limits, springs, loosened) if way is not None]
+    least = sorted(ways, key=lambda way: sum(give.amount / give.bound.scale for give in way.gives))
+    return (*least[:1], *springs)
 
 
 def _with_sizes(spring: OtherSpring, loose: Loosened) -> OtherSpring | None:
