@@ -57,7 +57,7 @@ def laid_on(outline: Array, radius: float, angle: float) -> tuple[float, float]:
         on_it = (turned > -1e-5) & (turned < np.abs(sweeps) + 1e-5)
         found += list(zip(heights[on_it], np.angle(normals[on_it] / upwards), strict=True))
     height, leaning = max(found)
-    return float(height), float(height * math.tan(-leaning))
+    return float(height), float(height * math.tan(leaning))
 
 
 @dataclass(frozen=True)

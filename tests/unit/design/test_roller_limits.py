@@ -115,7 +115,7 @@ def test_goals_over_the_spreads_are_refused_and_a_design_has_its_tolerance() -> 
         design_cam(machine(), **asked, goals=[ToleranceQuantile()], settings=QUICK)
     design = design_cam(machine(), **asked, settings=replace(QUICK, draws=20))
     assert design.tolerance is not None
-    alone = {each.name: each.alone for each in design.tolerance.contributions}
+    alone = {each.cause.name: each.alone for each in design.tolerance.causes}
     # A slope of the edge makes the torque, its place does not.
     assert alone["spring.cam.contour.wave"] > 2.0 * alone["spring.cam.contour.offset"] > 0.0
     assert alone["spring.cam.roller_radius"] < 0.2 * alone["spring.cam.contour.wave"]
