@@ -82,21 +82,15 @@ def other_springs(
     sure = _SURE * allowed
     loosened = [Loosened(other, kept, largest_error=sure, best=at) for other, kept, at in designs]
     for spring, loose in zip(springs, loosened, strict=True):
-        if (enough := _with_sizes(spring, loose)) is not None:
-            return (enough, *springs)
+        for freed in loose.sizes_tried().enough[:1]:
+            return (replace(spring, error=freed.error, freed=freed), *springs)
     ways = [way for way in map(_with_limits, springs, loosened) if way is not None]
     least = sorted(ways, key=lambda way: sum(give.amount / give.bound.scale for give in way.gives))
     return (*least[:1], *springs)
 
 
-def _with_sizes(spring: OtherSpring, loose: Loosened) -> OtherSpring | None:
-    """Return another spring with as few sizes freed as are enough; ``None`` where all are not."""
-    enough = loose.sizes_tried().enough
-    return replace(spring, error=enough[0].error, freed=enough[0]) if enough else None
-
-
 def _with_limits(spring: OtherSpring, loose: Loosened) -> OtherSpring | None:
-    """Return it with all sizes freed and limits moved, as little as is enough; ``None`` without sense."""
+    """Return another spring with all sizes freed and limits moved as little as is enough, or ``None``."""
     limits = [i for i in range(len(loose.bounds)) if i != loose.error]
     outcome = loose.least(loose.candidates, limits)
     gives = [loose.give(i, outcome) for i in limits if not _nothing(loose.give(i, outcome))]
