@@ -161,7 +161,7 @@ def _as_json(run: CoSimulation, study: Convergence | None, out: Path) -> dict[st
         | ({"error": run.errors[n]} if n in run.errors else {})
         for n, v in run.trace.signals.items()
     }
-    content = {"file": out, "step": run.step, "delays": dict(run.delays), "signals": ends}
+    content: dict[str, Any] = {"file": out, "step": run.step, "delays": dict(run.delays), "signals": ends}
     if study is not None:
         changes = {
             n: {"differences": d, "orders": [None if math.isnan(o) else o for o in study.orders(n)]}

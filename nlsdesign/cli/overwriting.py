@@ -60,7 +60,7 @@ def out_file_option(
     ``default``: file if none is given; ``None`` where it must be given.
     """
     kind = NamedPath(dir_okay=False, example=default or f"my{ending or '.toml'}")
-    shown = {"default": default, "show_default": True} if default else {"required": True}
+    shown: dict[str, Any] = {"default": default, "show_default": True} if default else {"required": True}
     check = functools.partial(_file_can_be_made, ending=ending)
     option = click.option("--out", type=kind, help=text, callback=check, **shown)
 

@@ -27,7 +27,7 @@ _PLACEHOLDER = re.compile(r"^(?P<indent> *)@(?P<row>\w+)@\n|@(?P<name>\w+)@", re
 
 def template(name: str) -> str:
     """Return the text of a fixed template."""
-    return (files(__package__) / "templates" / name).read_text(encoding="utf-8")
+    return (files("nlsdesign.export") / "templates" / name).read_text(encoding="utf-8")
 
 
 def filled(name: str, values: Mapping[str, str | Sequence[str]]) -> str:

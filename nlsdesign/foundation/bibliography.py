@@ -34,10 +34,8 @@ class Reference:
 @functools.cache
 def references() -> Mapping[str, Reference]:
     """Return all publications by key."""
-    entries: Mapping[str, Any] = _tables()["sources"]
-    return {
-        key: Reference(key, **{**entry, "authors": tuple(entry["authors"])}) for key, entry in entries.items()
-    }
+    entries: Mapping[str, dict[str, Any]] = _tables()["sources"]
+    return {k: Reference(k, **entry | {"authors": tuple(entry["authors"])}) for k, entry in entries.items()}
 
 
 @functools.cache

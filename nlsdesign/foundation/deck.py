@@ -306,7 +306,7 @@ def read_deck(text: str, path: Path) -> Deck:
     while inner:
         levels += 1
         each = [v for t in inner for v in (t.values() if isinstance(t, dict) else t)]
-        inner = [v for v in each if isinstance(v, dict | list)]
+        inner = [v for v in each if isinstance(v, (dict, list))]
     if levels > _MOST_LEVELS:
         raise _too_deep(path.name)
     places = _places(text)

@@ -241,7 +241,7 @@ def to_json(value: Any) -> Any:
         return to_json(value.tolist())
     if isinstance(value, Mapping):
         return {str(name): to_json(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
+    if isinstance(value, (list, tuple)):
         return [to_json(each) for each in value]
     if isinstance(value, bool | np.bool_):
         return bool(value)

@@ -96,12 +96,12 @@ class DeclaredOrigin(Origin):
     _values: Mapping[str, float | Quantity]
 
     @property
-    def deck(self) -> str:
+    def deck(self) -> str:  # pyrefly: ignore[bad-override]
         """Name of the deck."""
         return self._assembly.name
 
     @property
-    def parent(self) -> ParentDeck | None:
+    def parent(self) -> ParentDeck | None:  # pyrefly: ignore[bad-override]
         """The deck that this one was made from."""
         return self._assembly.parent
 
@@ -111,7 +111,7 @@ class DeclaredOrigin(Origin):
         return deck_digest(self._assembly, self._differing)
 
     @property
-    def changed(self) -> tuple[str, ...]:
+    def changed(self) -> tuple[str, ...]:  # pyrefly: ignore[bad-override]
         """Full names of the numbers that are not those of the deck."""
         return tuple(self._differing)
 

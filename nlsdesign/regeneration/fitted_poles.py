@@ -143,7 +143,7 @@ class FittedPoles:
         unit = typeset_unit(self.design.step.plant.estimate.unit)
         factor, prefixed = shared_prefix([e.after for e in self.errors], unit)
         heads = ("record", "role", f"{prefixed} rms", "fitted", "average relative error, %", "fitted")
-        rows = [
+        rows: list[tuple[str, ...]] = [
             (e.record, e.role.replace("_", " "), *(three_digits(factor * v) for v in e[2:4]),
              *(three_digits(v) for v in e[4:6]))
             for e in self.errors

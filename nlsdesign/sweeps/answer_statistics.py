@@ -184,7 +184,7 @@ def _polynomial(unit: Array, values: Array, hull: Delaunay, low: Array, width: A
         left_out = residual / np.maximum(1e-12, 1.0 - np.sum(basis**2, axis=1))
         error = float(np.sqrt(np.mean(left_out**2)))
         if best is None or error < best[0]:
-            best = error, degree, np.linalg.solve(factor, basis.T @ values)
+            best = error, degree, np.asarray(np.linalg.solve(factor, basis.T @ values), dtype=np.float64)
     error, degree, weights = best or (float("nan"), 0, np.array([values.mean()]))
     x = y = np.linspace(0.0, 1.0, _CELLS)
     mesh = _mesh(x, y)

@@ -118,7 +118,7 @@ class PointPlan:
         """Return the SHA-256 of the plan: its columns, its size, and points all over it."""
         count = len(self)
         probes = sorted({round(k * (count - 1) / (_PROBES - 1)) for k in range(_PROBES)})
-        content = [[asdict(column) for column in self.columns], count, [each.count for each in self._sets]]
+        content: list[Any] = [[asdict(c) for c in self.columns], count, [each.count for each in self._sets]]
         content.append([[k, *map(repr, self.point(k))] for k in probes])
         for each in self._sets:
             if each.count <= _PROBES**2:

@@ -186,7 +186,7 @@ def _described(value: Any) -> str:
         return f"{type(value).__qualname__}({', '.join(f'{name}={_described(v)}' for name, v in inner)})"
     if isinstance(value, Mapping):
         return "{" + ", ".join(f"{key!r}: {_described(value[key])}" for key in sorted(value, key=repr)) + "}"
-    if isinstance(value, tuple | list):
+    if isinstance(value, (tuple, list)):
         return "(" + ", ".join(map(_described, value)) + ")"
     if value is None or isinstance(value, str | int | float | bool):
         return repr(value)

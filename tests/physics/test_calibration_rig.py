@@ -43,6 +43,7 @@ def curve_error(found: Estimate, machine: Machine, angles: np.ndarray) -> np.nda
     return np.array([torque - torque_curve(machine, angles), deviation])
 
 
+@pytest.mark.slow
 def test_a_rough_load_cell_record_of_a_renamed_machine(tmp_path: Path) -> None:
     other = renamed(deck(), exchanged)
     true = drawn_machine(12)

@@ -47,6 +47,7 @@ def error_of(plan: CalibrationPlan, title: str) -> float:
     return next(each.errors[RUNNING] for each in plan.ranked if each.title == title)
 
 
+@pytest.mark.slow
 def test_now_is_the_bound_of_observer_errors(plan: CalibrationPlan) -> None:
     """One is taken along the machine as declared, the other along drawn machines, with other numbers in the
     slopes: on a linear spring they differ by no more than these numbers do, 10 % each."""

@@ -242,6 +242,7 @@ SMALL, LARGE = "2815,2.8,19.6,14,29.5,33.5\n", "3219,3.2,22.4,14,38.5,37.5\n"
 WEAK = "1601,1.6,8.8,14,14.1,12.0\n"
 
 
+@pytest.mark.slow
 def test_the_smallest_coil_of_a_catalogue_that_holds_is_taken(tmp_path: Path) -> None:
     (tmp_path / "coils.csv").write_text("# made up\n" + HEADS + LARGE + WEAK + SMALL, encoding="utf-8")
     job = tmp_path / "job.toml"

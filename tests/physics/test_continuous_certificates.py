@@ -143,6 +143,7 @@ def test_what_is_too_fast_is_answered_with_the_fastest() -> None:
     assert certify_continuous(model, decay=0.98 * float(named[1])).proof.decay == 0.98 * float(named[1])
 
 
+@pytest.mark.slow
 def test_names_do_not_matter() -> None:
     machine = rn.renamed(declare(load_deck(DECKS[1])), rn.exchanged)
     one, other = (certify_continuous(m, decay=40.0) for m in (plant(DECKS[1]), flatten(machine.assembly)))

@@ -98,6 +98,7 @@ def exact_masses(times: np.ndarray) -> np.ndarray:
     return np.array([(expm(matrix * t) @ [0.1, 0.0, 0.0, 0.0])[[0, 2]] for t in times])
 
 
+@pytest.mark.long_cases("Held", "Iterated")
 @pytest.mark.parametrize("coupling", [Held(), Extrapolated(), Iterated()], ids=lambda c: type(c).__name__)
 def test_two_masses_converge_to_the_matrix_exponential(coupling: Coupling, masses: dict[str, Path]) -> None:
     errors = []
@@ -116,6 +117,7 @@ def test_two_masses_converge_to_the_matrix_exponential(coupling: Coupling, masse
         assert np.all(orders(errors) <= 2.2)
 
 
+@pytest.mark.slow
 def test_second_order_is_the_default_and_better_than_held(masses: dict[str, Path]) -> None:
     def error(step: float | Stepping) -> float:
         run = cosimulate(fmus=masses, wires=MASSES, inputs={}, stop=0.6, step=step)

@@ -84,6 +84,7 @@ def test_the_loss_is_on_one_side_and_each_part_of_it_as_likely() -> None:
     assert np.std(shares) == pytest.approx(1.0 / math.sqrt(12.0), rel=0.02)
 
 
+@pytest.mark.slow
 def test_it_is_one_more_cause_and_a_trim_takes_it_back() -> None:
     plain, set_too = (
         tolerance_analysis(with_rubber(share=share), target=TARGET, draws=400, seed=2)

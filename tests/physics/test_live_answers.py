@@ -147,6 +147,7 @@ def path(deck: str, drags: int) -> None:
         assert "local optimum" in full_answer(full, live.question, answer, solved).message
 
 
+@pytest.mark.slow
 def test_a_path_of_drags_ends_where_a_fresh_session_begins() -> None:
     path("cam-actuator", 3)
 

@@ -25,6 +25,7 @@ def finger(*free: str) -> CamDesign:
     return design_cam(machine, target=TARGET, free=names, settings=settings)
 
 
+@pytest.mark.slow
 def test_a_pretension_that_is_free_makes_up_for_the_travel_that_an_onset_loses() -> None:
     free = finger("spring.pretension")
     assert free.miss is None

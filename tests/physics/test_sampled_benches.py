@@ -154,6 +154,7 @@ def test_dry_friction_that_turns_over_between_samples_is_no_missing_effect(
         assert max(squares(*machine, "motor").values()) > NOISE_ALONE, "or the test would show nothing"
 
 
+@pytest.mark.slow
 def test_noise_that_a_lossy_gear_rectifies_is_no_missing_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     machine = geared_limb()
     assert max(squares(*machine, "motor").values()) < NOISE_ALONE

@@ -145,6 +145,7 @@ def test_the_default_loses_to_no_pid_over_the_spread(deck: str) -> None:
     assert default < 0.8 * middle(law=PidTorque())
 
 
+@pytest.mark.slow
 def test_a_gain_that_nobody_gave_is_lowered_to_one_with_a_margin_and_a_given_one_is_named(
     monkeypatch: pytest.MonkeyPatch, reproduced: SpreadMargins
 ) -> None:

@@ -230,6 +230,7 @@ def test_both_sides_of_a_cam_meet_their_own_curve_on_one_element(turned: bool) -
     assert design.actuator.parent.name == "knee"
 
 
+@pytest.mark.slow
 def test_what_cannot_be_designed_on_both_sides_says_so() -> None:
     with pytest.raises(ArrangementError, match=r"OneSidedCam: has no contour for each side.*LopsidedCam"):
         design_sides(beside(), targets=SIDES, settings=QUICK)

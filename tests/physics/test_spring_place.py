@@ -97,6 +97,7 @@ def test_the_motor_beside_the_spring_gives_what_the_spring_does_not(joint: str) 
             assert table.torques[1] == pytest.approx(risen, rel=0.1)
 
 
+@pytest.mark.long_cases("False")
 @pytest.mark.parametrize("both_ways", [False, True])
 def test_no_spring_beside_the_drive_gets_below_the_bound(both_ways: bool) -> None:
     curve, random = beside("ankle", both_ways), np.random.default_rng(2)
@@ -205,6 +206,7 @@ CASES = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases(*(case for case in CASES if case not in QUICK))
 @pytest.mark.parametrize("place", ["in series", "beside", "both ways"])
 @pytest.mark.parametrize("drive", [DRIVE, LIMITED], ids=["free", "limited"])

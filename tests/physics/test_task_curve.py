@@ -83,6 +83,7 @@ def without_a_form(joint: str, count: int) -> tuple[float, np.ndarray, np.ndarra
     return float(rest**2), cycle.torque, bent
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("ankle-1440", "hip-480")
 @pytest.mark.parametrize(("joint", "count"), [("hip", 480), ("knee", 480), ("ankle", 1440)])
 def test_no_worse_than_the_optimum_without_a_form(joint: str, count: int) -> None:

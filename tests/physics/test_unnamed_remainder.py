@@ -70,6 +70,7 @@ def case(actuator: str, effect: str, only: tuple[str, ...] = RECORDS) -> Case:
     return Case(records, comparison, comparison.base(declared))
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("wrist-strain_stiffening-spring")
 @pytest.mark.parametrize(("actuator", "effect", "block"), CASES)
 def test_the_gap_closes_on_a_record_that_was_held_out(actuator: str, effect: str, block: str) -> None:
@@ -96,12 +97,14 @@ def test_no_record_is_proposed_for_the_values_of_a_table(tmp_path: Path) -> None
     assert not [text for text in (*found.unidentified, *found.next_steps) if "unnamed" in text]
 
 
+@pytest.mark.slow
 def test_what_repeats_in_time_is_refused() -> None:
     made = case("wrist", "periodic_disturbance", RECORDS[:3])
     assert made.excess(made.base, "motor", "fit") > 1.0
     assert made.part("motor") is None
 
 
+@pytest.mark.slow
 def test_nothing_is_added_to_noise() -> None:
     made = case("arm", "none", RECORDS[:3])
     assert made.part("motor") is None

@@ -33,6 +33,7 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, f
         return out, dict(alternative_rubber.main(out, fast=True).numbers)
 
 
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(results: tuple[Path, dict[str, float]]) -> None:
     """Of one rubber and one loss; what is ranked among all is claimed of the whole study."""
     out, numbers = results
@@ -141,6 +142,7 @@ def test_a_gain_that_is_too_high_is_called_a_limit_cycle(ran: Measured) -> None:
     assert list(ran.cycling[:2]) == [False, True]
 
 
+@pytest.mark.slow
 def test_the_energy_lost_is_that_of_the_harmonics_of_the_force(bench: Bench, ran: Measured) -> None:
     """F_e(θ) = τ(θ)/(2·h(θ)) of the target; each harmonic times 1 + Σ g·iωτ/(1 + iωτ); ∮ 2·h·F dθ."""
     angle = ran.deflection[2, ran.counted]

@@ -27,6 +27,7 @@ OUTCOMES = {
 }
 
 
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
     results = main(tmp_path, fast=True)
     assert runner.not_as_claimed(results.numbers, runner.claims("austin2015_closed_loop")) == {}

@@ -38,12 +38,14 @@ def finger(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, fl
     return out, dict(run_study("one_sided_finger_drive", out, fast=True))
 
 
+@pytest.mark.slow
 def test_the_finger_keeps_its_claims(finger: tuple[Path, dict[str, float]]) -> None:
     _, results = finger
     assert set(results) == set(claims("one_sided_finger_drive"))
     assert not_as_claimed(results, claims("one_sided_finger_drive")) == {}
 
 
+@pytest.mark.slow
 def test_the_written_deck_has_the_torque_that_was_asked_for(finger: tuple[Path, dict[str, float]]) -> None:
     out, _ = finger
     model = flatten(declare(load_deck(str(out / "designed.toml"))))
@@ -53,6 +55,7 @@ def test_the_written_deck_has_the_torque_that_was_asked_for(finger: tuple[Path, 
     assert equilibrium_torque(model, "spring", angle) == pytest.approx(wanted, abs=5e-3)
 
 
+@pytest.mark.slow
 def test_the_edge_lies_one_cable_radius_inside_the_centre_line(finger: tuple[Path, dict[str, float]]) -> None:
     out, _ = finger
     lines = (out / "drawing" / "cam_centre_line.csv").read_text(encoding="utf8").splitlines()

@@ -32,6 +32,7 @@ def call(words: list[str], environment: dict[str, str], place: Path) -> str:
     return done.stdout
 
 
+@pytest.mark.slow
 def test_the_installed_package_serves_a_deck(root: Path, installed: dict[str, str], tmp_path: Path) -> None:
     deck = str(root / "examples" / "rubber_lab" / "decks" / "jointed.toml")
     assert "no problem in 16 numbers" in call([*COMMAND, "deck", "check", deck], installed, tmp_path)

@@ -58,6 +58,7 @@ def test_a_pair_of_such_cams_gives_the_torque_when_it_rolls() -> None:
     assert int(np.argmax(touching)) == pytest.approx(1200, abs=2), "convex there: the tangent touches once"
 
 
+@pytest.mark.slow
 def test_a_linear_torque_of_a_linear_coil_takes_a_round_drum() -> None:
     """E = c·θ²/2 = k·e²/2, so e = θ·√(c/k): the drum of √(c/k); the force is c·θ over it."""
     answers = {ours.key: ours for ours in study.pulleys()}

@@ -15,6 +15,7 @@ pytestmark = pytest.mark.usefixtures("undrawn")
 LINEAR = ("Hooke", "Kelvin_Voigt", "Maxwell", "standard_linear_solid", "Burgers")
 
 
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     results = run_study("rubber_models_compared", tmp_path)
     expected = claims("rubber_models_compared")

@@ -52,6 +52,7 @@ def test_reach_is_where_the_speed_limit_is_met_unless_the_current_is_not_enough(
     assert slower < 0.9 * limit / (2.0 * np.pi * angle)
 
 
+@pytest.mark.slow
 def test_the_largest_gain_keeps_the_margins_of_every_drawn_machine() -> None:
     """Both ways: each drawn machine has them, and with 2 % more gain one has not."""
     (pid, scheduled) = lines_of({"stiff": published()["stiff"]}, draws=2)

@@ -20,12 +20,14 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, study.Resul
     return out, study.main(out, fast=True)
 
 
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(results: tuple[Path, study.Results]) -> None:
     out, found = results
     assert runner.not_as_claimed(asdict(found), runner.claims("spring_under_a_blow")) == {}
     assert "energy of the blow" in (out / "report.html").read_text(encoding="utf8")
 
 
+@pytest.mark.slow
 def test_a_held_linear_spring_takes_the_whole_energy(results: tuple[Path, study.Results]) -> None:
     """E = T^2/(2 k), so T = sqrt(2 k E)."""
     _, found = results
@@ -38,6 +40,7 @@ def test_a_held_linear_spring_takes_the_whole_energy(results: tuple[Path, study.
         assert travel == pytest.approx(0.5 * stiffness * math.radians(53.0) ** 2, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_rotor_that_gives_way_agrees_with_an_independent_integration(
     results: tuple[Path, study.Results],
 ) -> None:

@@ -32,6 +32,7 @@ def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
     assert "no bound is proved" in report
 
 
+@pytest.mark.slow
 def test_the_fast_way_looks_at_some_of_the_ratios(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     study = load_study("torque_curve_from_gait")
     assert set(study.COARSE) < set(study.RATIOS)

@@ -87,9 +87,8 @@ class Springpot(Element):
         """
         numbers = {name: quantity.number for name, quantity in self.parameters().items()}
         s = 2j * math.pi * frequency
-        return sum(
-            (modulus * s / (s + rate) for modulus, rate in _branches(**numbers)), start=np.zeros_like(s)
-        )
+        parts = [modulus * s / (s + rate) for modulus, rate in _branches(**numbers)]
+        return np.add.reduce(parts, axis=0, dtype=np.complex128)
 
     def title(self) -> str:
         """Return one line that names the law, its numbers and what the approximation costs."""

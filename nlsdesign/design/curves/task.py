@@ -137,7 +137,7 @@ class Task:
         phase = np.outer(time, turns) + derivative * np.pi / 2.0
         scale = turns**derivative
         first = np.full((len(time), 1), 1.0 if derivative == 0 else 0.0)
-        return np.hstack([first, scale * np.cos(phase), scale * np.sin(phase)])
+        return np.hstack([first, scale * np.cos(phase), scale * np.sin(phase)], dtype=np.float64)
 
     def _coefficients(self, values: Array) -> Array:
         time = self._columns[0]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -172,7 +173,7 @@ def closed_loop(
                             "current": run.current, **(differences or {})})  # fmt: skip
     count = 3 if differences else 2
     figure, axes = panels(count, height=1.5 + 1.45 * count, sharex=True, height_ratios=[1.8, 1, 1][:count])
-    shown = (
+    shown: tuple[tuple[str, Array, dict[str, Any]], ...] = (
         ("desired", run.desired, {"color": INK.light, "linestyle": (0, (4, 2)), "linewidth": 1.2}),
         ("true", run.true, {"color": AFTER.light}),
         ("estimated", run.estimated, {"color": PURPLE.light, "linestyle": DASHES[2]}),

@@ -36,11 +36,11 @@ class Sheet:
     def line(self, *points: Sequence[float] | Array, width: float = THIN, **look: Any) -> None:
         """Draw straight lines through points."""
         x, y = np.array(points, dtype=float).T
-        self.axes.plot(x, y, linewidth=width, **{"color": INK.light, "solid_capstyle": "butt", **look})
+        self.axes.plot(x, y, linewidth=width, **dict[str, Any](color=INK.light, solid_capstyle="butt") | look)
 
     def text(self, x: float, y: float, *, text: str, **look: Any) -> None:
         """Write text; by default from a point to the right, on its base line."""
-        self.axes.text(x, y, text, **{"fontsize": TEXT, "color": INK.light, "va": "baseline", **look})
+        self.axes.text(x, y, text, **dict[str, Any](fontsize=TEXT, color=INK.light, va="baseline") | look)
 
     def box(self, x: float, y: float, *, width: float, height: float) -> None:
         """Draw the frame of a rectangle."""

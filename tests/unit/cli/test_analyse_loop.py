@@ -88,6 +88,7 @@ def test_a_loop_that_limit_cycles_is_a_finding_with_the_gain_where_it_begins(tmp
     )
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("austin2015_figure_consistent")
 @pytest.mark.parametrize("deck", ["austin2015_stiff_spring", "austin2015_figure_consistent"])
 @pytest.mark.usefixtures("two_frequencies", "two_machines")

@@ -82,6 +82,7 @@ def test_number_without_unit_is_refused(run: Run) -> None:
     assert "has no unit" in err
 
 
+@pytest.mark.slow
 def test_a_design_that_misses_is_no_success(run: Run, tmp_path: Path) -> None:
     """The contour alone cannot give the published actuator 5 N·m: the rubber would tear."""
     words = [

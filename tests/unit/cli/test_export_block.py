@@ -37,6 +37,7 @@ def code(exported, tmp_path):
     return "code/observer_block.json"
 
 
+@pytest.mark.slow
 def test_code_says_how_its_blocks_are_made(run: Run, code: str, tmp_path) -> None:
     better = tmp_path / "better.toml"
     write_deck(declare(load_deck(DECK)).with_values(BETTER), better)

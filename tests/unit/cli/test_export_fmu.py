@@ -27,6 +27,7 @@ def described(file: Path) -> fmpy.model_description.ModelDescription:
     return fmpy.read_model_description(str(file))
 
 
+@pytest.mark.slow
 def test_all_that_the_deck_allows_is_written_with_its_author_and_date(run: Run, tmp_path: Path) -> None:
     about = ("--author", "A. Maker", "--licence", "CC0", "--date", "2026-03-04T12:00:00Z")
     status, out, err = run(*WORDS, "--out", "o", *about)

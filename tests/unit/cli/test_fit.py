@@ -50,6 +50,7 @@ def assembly_of(deck: Path) -> Assembly:
     return declare(load_deck(deck))
 
 
+@pytest.mark.slow
 def test_the_numbers_of_the_rig_come_back_with_an_honest_error(run: Run, bench: Path, tmp_path: Path) -> None:
     called = ("fit", "--deck", str(bench / "deck.toml"), "--records", str(bench / "records"))
     status, out, _ = run(*called, "--hold-out", "multi*", "--out", str(tmp_path / "out"), "--json")

@@ -160,6 +160,7 @@ server.asyncio.run = lambda run: run.close()
     assert not modules & HEAVY
 
 
+@pytest.mark.slow
 def test_a_room_loads_sympy_and_python_control_only_when_it_uses_them(loaded: Loaded) -> None:
     """What all rooms together have not loaded, none of them has."""
     rooms = ("report", "discrepancy", "observer", "control", "analysis")

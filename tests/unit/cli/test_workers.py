@@ -32,6 +32,7 @@ def helpers() -> set[int]:
 
 
 @linux
+@pytest.mark.long_cases("64")
 @pytest.mark.parametrize("cores", [1, 64])
 def test_work_is_done_in_as_many_processes_as_are_asked_for(
     cores: int, monkeypatch: pytest.MonkeyPatch

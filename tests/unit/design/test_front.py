@@ -89,6 +89,7 @@ def test_the_same_front_comes_again_and_progress_is_told() -> None:
     assert len(calls) >= 7
 
 
+@pytest.mark.slow
 def test_the_table_holds_goals_numbers_and_limits(tmp_path: Path) -> None:
     front().write_csv(tmp_path / "out" / "front.csv")
     with (tmp_path / "out" / "front.csv").open(encoding="utf-8", newline="") as stream:

@@ -102,6 +102,7 @@ def test_a_conflict_says_which_number_to_free() -> None:
     design_cam(tight, target=TARGET, free=PRETENSION, keep=keep, settings=WHOLE)
 
 
+@pytest.mark.slow
 def test_declared_strength_and_cable_are_limits_unless_others_are_asked_for() -> None:
     published = declare(load_deck("austin2015_as_printed"))
     values = flatten(published).values

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ASKED = """
 import sys
 from nlsdesign.foundation.extensions import load_extension
@@ -22,6 +24,7 @@ print(asked.limit_values["LeastContourRadius"].kind.title)
 """
 
 
+@pytest.mark.slow
 def test_the_page_on_a_limit_of_ones_own(root: Path, tmp_path: Path) -> None:
     """In processes of their own, so that no other test knows the limit."""
     page = (root / "docs/how_to/own_limit.md").read_text(encoding="utf-8")

@@ -62,6 +62,7 @@ def test_two_shapes_of_one_cost_are_two_designs() -> None:
     assert times_found(problem, [failed]) == 0
 
 
+@pytest.mark.slow
 def test_how_often_the_best_was_found_is_said() -> None:
     settings = DesignSettings(look_for_size_ranges=False, draws=0)
     for most, words in ((24, "found from 6 of 6"), (1, "found once only in 1: another may be better")):

@@ -138,6 +138,7 @@ def test_the_same_seed_gives_the_same_springs(result: ToleranceResult) -> None:
     assert not np.any(other.errors == result.errors)
 
 
+@pytest.mark.slow
 def test_one_cause_less_leaves_the_draws_of_the_others(result: ToleranceResult) -> None:
     """Then two designs can be compared spring by spring."""
     rules = SpreadRules(given={"spring.cam.cable_radius": 0.0})

@@ -41,6 +41,7 @@ def started(joint) -> Running:
     return running
 
 
+@pytest.mark.slow
 def test_a_loaded_block_makes_the_code_of_the_better_deck(joint, tmp_path):
     _, _, better, _ = joint
     plain = recipe().designed(flatten(machine().with_values(BETTER)), controller)
@@ -213,6 +214,7 @@ def test_numbers_that_the_code_cannot_take_are_named(joint, tmp_path):
         write_parameter_block(code, tmp_path / "block.hex")
 
 
+@pytest.mark.slow
 def test_a_deck_of_another_form_is_refused(joint):
     _, code, _, _ = joint
     with pytest.raises(ExportError, match="export the code again"):

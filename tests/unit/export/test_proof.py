@@ -39,6 +39,7 @@ def broken(source: CSource, folder: Path, *faults: tuple[str, str, str]) -> CSou
     return replace(source, header=folder / source.header.name, source=folder / source.source.name)
 
 
+@pytest.mark.slow
 @needs_prover
 def test_nothing_is_undefined_and_all_stays_finite(controller: CSource) -> None:
     proof = prove_step(controller)

@@ -96,6 +96,7 @@ def test_tables_are_put_between_their_marks():
         targets.replaced(page, {"two": []})
 
 
+@pytest.mark.slow
 def test_what_all_kinds_give_has_the_same_names(plant, tmp_path):
     """Names in C: a robot's code does not change with the kind of observer."""
     named = []

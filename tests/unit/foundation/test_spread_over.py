@@ -100,6 +100,7 @@ def analysed(draws: int) -> dict[str, Any]:
     return content(tolerance_analysis(actuator, target=CURVE, draws=draws, seed=3))
 
 
+@pytest.mark.slow
 def test_a_tolerance_analysis_has_the_same_bits_wherever_its_causes_are_computed() -> None:
     expected = analysed(20)
     for executor in BOTH:

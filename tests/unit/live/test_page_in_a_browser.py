@@ -499,6 +499,7 @@ def test_hostile_names_stay_words(tab: Tab) -> None:
     assert tab.evaluate("[document.querySelectorAll('img').length, window.hit ?? null]") == [0, None]
 
 
+@pytest.mark.slow
 def test_uploads_that_are_too_large_are_refused_in_words_and_the_page_lives_on(tab: Tab) -> None:
     status, words = tab.evaluate(ASK.format(path="/api/open", body='"x".repeat(1100000)'))
     assert status == 413

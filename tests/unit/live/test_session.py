@@ -76,6 +76,7 @@ def rows(answer: Message) -> dict[str, list[float]]:
 # --- tolerance cloud and torque loop --------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_the_cloud_is_the_tolerance_analysis_of_the_design_that_is_shown(one: Session) -> None:
     news = one.work("ToleranceCloud")
     assert news["state"] == "done", news["message"]

@@ -247,6 +247,7 @@ def test_every_machine_is_shown_and_simulated(run: Run, decks: dict[str, str], d
     assert all(np.all(np.isfinite(values)) for values in trace.signals.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("command", ["fit", "diagnose", "simulate"])
 def test_records_of_another_machine_are_used_or_one_sentence_says_why(
     run: Run, decks: dict[str, str], tmp_path: Path, command: str

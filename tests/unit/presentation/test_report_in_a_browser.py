@@ -124,6 +124,7 @@ def test_the_printed_page_is_several_sheets_with_everything_unfolded(tab: Tab, p
     assert tab.evaluate("[...document.querySelectorAll('details')].every((each) => each.open)")
 
 
+@pytest.mark.slow
 def test_the_numbers_of_a_figure_can_be_saved(tab: Tab, page: Path) -> None:
     tab.open(page)
     saved = tab.evaluate(

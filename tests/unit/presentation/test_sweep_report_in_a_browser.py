@@ -121,6 +121,7 @@ def test_a_number_that_is_typed_gives_its_row_or_says_where_it_stands(opened: Ta
     assert "--deck-of 4711" in opened.evaluate(f"{CHOSEN}.innerText")
 
 
+@pytest.mark.long_cases("320-light", "1280-dark")
 @pytest.mark.parametrize(("width", "theme"), [(320, "light"), (390, "dark"), (1280, "dark")])
 def test_the_page_is_no_wider_than_its_screen_also_with_a_row_open(
     tab: Tab, page: Path, width: int, theme: str

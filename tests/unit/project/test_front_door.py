@@ -81,6 +81,7 @@ def test_private_names_are_refused_without_a_search() -> None:
         getattr(nls, "__wrapped__")  # noqa: B009
 
 
+@pytest.mark.slow
 def test_a_type_checker_sees_every_name(root: Path, tmp_path: Path) -> None:
     pytest.importorskip("mypy")
     names = sorted({*listed(root), "models"})

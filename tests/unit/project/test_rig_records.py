@@ -67,6 +67,7 @@ def mixed_set() -> dict[str, np.ndarray]:
     return make_records(ACTUATORS["arm"], {"coulomb_friction": 1.0, "second_relaxation": 0.5}, seed=5)
 
 
+@pytest.mark.slow
 def test_a_set_is_six_finite_records_at_the_sample_rate(mixed_set: dict[str, np.ndarray]) -> None:
     assert tuple(mixed_set) == RECORDS == (*SINES, "hold", "multisine")
     durations = [12.0, 8.0, 5.0, 3.0, 12.0, 10.0]
@@ -78,6 +79,7 @@ def test_a_set_is_six_finite_records_at_the_sample_rate(mixed_set: dict[str, np.
         assert np.max(np.abs(table[:, 2])) < 12.0, f"{name}: the current is at its limit"
 
 
+@pytest.mark.slow
 def test_the_seed_fixes_a_set(mixed_set: dict[str, np.ndarray]) -> None:
     effects, name = {"coulomb_friction": 1.0, "second_relaxation": 0.5}, "sine_15deg_5.0Hz"
     again = make_records(ACTUATORS["arm"], effects, seed=5, only=[name])
@@ -136,6 +138,7 @@ def test_strength_scales_the_effect_and_wrong_names_are_told() -> None:
 # --- files ------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_files_hold_what_was_declared_and_measured(
     tmp_path: Path, actuator: Actuator, mixed_set: dict[str, np.ndarray]
 ) -> None:

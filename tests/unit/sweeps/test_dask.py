@@ -79,6 +79,7 @@ def numbers_of_workers(address: str) -> list[int]:
         return list(client.run(os.getpid).values())
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_in_mid_run_changes_nothing(cluster: str) -> None:
     first, killed, got = numbers_of_workers(cluster)[0], False, []
     for batch in shared_map(square, ((k, k) for k in range(200)), DaskScheduler(cluster), count=200):

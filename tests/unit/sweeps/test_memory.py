@@ -75,6 +75,7 @@ def most_bytes(folder: Path, count: int) -> int:
     return most
 
 
+@pytest.mark.slow
 def test_the_driver_holds_no_results(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run_sweep, "_MOST_ROWS", 256)
     most_bytes(tmp_path / "loaded", 600)

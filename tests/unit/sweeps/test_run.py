@@ -48,6 +48,7 @@ def test_processes_give_the_bytes_of_one_process_and_nothing_is_computed_twice(t
     assert sorted((tmp_path / "two" / "parts").iterdir()) == before
 
 
+@pytest.mark.slow
 def test_a_killed_driver_leaves_what_it_had_and_the_next_run_adds_the_rest(tmp_path: Path) -> None:
     out = tmp_path / "killed"
     with sweeping.driver(out, 60, 0.1, "2") as process:

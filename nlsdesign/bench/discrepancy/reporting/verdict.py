@@ -483,7 +483,7 @@ def _rounded(content: Any, digits: int) -> Any:
         return significant([content], digits)[0] if math.isfinite(content) else None
     if isinstance(content, Mapping):
         return {key: _rounded(value, digits) for key, value in content.items()}
-    return [_rounded(each, digits) for each in content] if isinstance(content, list | tuple) else content
+    return [_rounded(each, digits) for each in content] if isinstance(content, (list, tuple)) else content
 
 
 def gaps_of(before: Hypothesis, after: Hypothesis, comparison: Comparison) -> tuple[RecordGap, ...]:

@@ -129,12 +129,12 @@ class DrivenBlock:
             result[self._shifted] = self._digest_shifted(inputs.shape[1], [inputs, rates])
             return result
 
-        at = digested(inputs, rates, known and known.at)
+        at = digested(inputs, rates, known.at if known else None)
         corners = _corners(self.block, self._sloped, inputs, record.step)
         if corners is None:
             return Samples(at, at[:, :-1], at[:, 1:], record.step)
-        begin = digested(corners[0], rates[:, :-1], known and known.begin)
-        end = digested(corners[1], rates[:, 1:], known and known.end)
+        begin = digested(corners[0], rates[:, :-1], known.begin if known else None)
+        end = digested(corners[1], rates[:, 1:], known.end if known else None)
         return Samples(at, begin, end, record.step)
 
     def _inputs(self, record: Record, values: Mapping[str, float], *, smooth: bool) -> tuple[Array, Array]:

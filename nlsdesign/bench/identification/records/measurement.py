@@ -664,8 +664,7 @@ def split(
                 did_you_mean=nearest(glob, names),
                 next_step=f"records are: {', '.join(names)}",
             )
-    roles: dict[str, Role] = dict.fromkeys(compared, "selection")
-    roles.update(dict.fromkeys(chosen, "held_out"))
+    roles: dict[str, Role] = {n: "held_out" if n in chosen else "selection" for n in compared | chosen}
     if len(roles) == len(names):
         raise MeasurementError(
             "records", "none is left for fitting",
@@ -714,7 +713,7 @@ def _record(file: Path, table: RecordTable, mapping: ColumnMap, part: int = 0) -
     """Return one table as a record; ``part`` counts those of a file that has gaps."""
     name = f"{file.stem}{_PART}{part}" if part else file.stem
     run = read_run(name, table, mapping)
-    sampling = {c.signal: c.sampling for c in mapping.columns if c.sampling not in (None, SAMPLED)}
+    sampling = {c.signal: c.sampling for c in mapping.columns if c.sampling and c.sampling != SAMPLED}
     record = Record(
         name, run.trace, source=f"{run.source}{_PART}{part}" if part else run.source,
         resolution=run.resolution, masked=run.masked, sampling={} if mapping.resample else sampling,

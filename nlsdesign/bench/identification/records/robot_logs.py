@@ -156,7 +156,7 @@ def _number(value: Any) -> float | None:
 def _numbers(message: Any, kind: str, joints: Sequence[str] = ()) -> Iterator[tuple[str, tuple[float, str]]]:
     """Return what a message holds: path of fields, number and unit; its head stays out."""
     members = dict(_members(message))
-    texts = [names for key in _NAMES if isinstance(names := members.get(key), list | tuple) and names]
+    texts = [names for key in _NAMES if isinstance(names := members.get(key), (list, tuple)) and names]
     named = next((names for names in texts if all(isinstance(name, str) for name in names)), joints)
     for name, value in members.items():
         if name == "header":
@@ -168,7 +168,7 @@ def _numbers(message: Any, kind: str, joints: Sequence[str] = ()) -> Iterator[tu
             inner = kind if unit else _kind_of(value) or kind
             for path, (size, own) in _numbers(value, inner, named):
                 yield f"{name}/{path}", (size, own or unit)
-        elif isinstance(value, list | tuple | np.ndarray) and 0 < len(value) <= _LONGEST_LIST:
+        elif isinstance(value, (list, tuple, np.ndarray)) and 0 < len(value) <= _LONGEST_LIST:
             labels = (
                 [f"/{n}" for n in named]
                 if len(named) == len(value)

@@ -234,6 +234,7 @@ def test_a_wrong_declared_number_is_suspect(tmp_path: Path) -> None:
     assert any("motor.torque_constant moved by +3" in w for w in calibrated(deck(LINEAR), found).words())
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("-1.0")
 @pytest.mark.parametrize("factor", [1e-3, -1.0])
 def test_a_weight_in_another_unit_or_sign_is_refused(tmp_path: Path, factor: float) -> None:
@@ -253,6 +254,7 @@ def test_what_the_deck_lacks_widens_all(tmp_path: Path, weighed: Estimate) -> No
     assert any("widened by" in w for w in calibrated(deck(LINEAR), found).words())
 
 
+@pytest.mark.slow
 def test_records_of_another_spring_are_refused(tmp_path: Path) -> None:
     folder = recorded("hung_weight", tmp_path, Machine())
     with pytest.raises(MeasurementError, match=r"misses the model by .* times its noise"):

@@ -102,6 +102,7 @@ def clipped(rows: np.ndarray) -> np.ndarray:
     return rows
 
 
+@pytest.mark.slow
 def test_files_of_an_earlier_run_do_not_stay_beside_a_verdict_that_has_none(
     rig: Assembly, clean: np.ndarray, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -274,6 +275,7 @@ def test_a_dead_channel_is_named_because_its_block_cannot_be_judged(
         diagnose(rig, load_records(tmp_path / "records", flatten(rig)), catalogue=(_never,))
 
 
+@pytest.mark.slow
 def test_a_channel_that_is_dead_in_one_record_makes_the_set_suspect(
     rig: Assembly, clean: np.ndarray, tmp_path: Path
 ) -> None:

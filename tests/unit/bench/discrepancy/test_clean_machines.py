@@ -33,7 +33,7 @@ def joint(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.long_cases("rack_carriage-1100-plain", "belt_axis-1103-slow")
+@pytest.mark.long_cases("rack_carriage-1100-plain", "belt_axis-1103-slow", "elastic_joint-1103-slow")
 @pytest.mark.parametrize(
     ("kind", "seed", "condition"),
     [("rack_carriage", 1100, "plain"), ("belt_axis", 1103, "slow"), ("elastic_joint", 1103, "slow")],
@@ -89,6 +89,7 @@ def test_a_span_of_rates_leaves_what_a_damping_does_that_nobody_declared(tmp_pat
     assert max(each.after / each.noise_floor for each in gaps) < 1.1
 
 
+@pytest.mark.slow
 def test_a_shift_that_explains_a_third_is_no_answer(tmp_path: Path) -> None:
     """Behind coarse counts friction is little beyond noise; a shift takes a third of it, and hid the name."""
     write_kind_case(tmp_path, "belt_axis", ("load_dependent_friction",), 1.0, 1120, condition="coarse")
@@ -134,6 +135,7 @@ def test_a_lag_is_not_what_inputs_are_read_beside() -> None:
     assert asked == ["friction"]
 
 
+@pytest.mark.slow
 def test_a_drift_that_imitates_half_a_sample_is_no_name(tmp_path: Path) -> None:
     """Behind coarse counts the hold of a current is not told; 0.26 ms in a second imitate half a sample."""
     write_kind_case(tmp_path, "rack_carriage", ("spring_damping",), 1.0, 1198, condition="coarse")

@@ -41,6 +41,7 @@ def test_an_eccentric_disc_is_told_at_its_own_encoder(seed: int, condition: str,
     assert condition == "coarse" or disc.aliases == ()
 
 
+@pytest.mark.slow
 def test_an_eccentric_disc_shows_in_the_balance_of_a_direct_drive(tmp_path: Path) -> None:
     rivals = effects.angle_sensor_eccentricity, effects.torque_ripple
     verdict = diagnosed(tmp_path, "direct_drive", "angle_sensor_eccentricity", 1195, "coarse", *rivals)
@@ -48,6 +49,7 @@ def test_an_eccentric_disc_shows_in_the_balance_of_a_direct_drive(tmp_path: Path
     assert verdict.complete
 
 
+@pytest.mark.slow
 def test_the_zero_of_either_of_two_encoders_is_one_class(tmp_path: Path) -> None:
     rivals = (effects.angle_sensor_bias,)
     verdict = diagnosed(tmp_path, "belt_axis", "angle_sensor_bias", 1196, "plain", *rivals)
@@ -57,6 +59,7 @@ def test_the_zero_of_either_of_two_encoders_is_one_class(tmp_path: Path) -> None
     assert all(alias.startswith("angle_sensor_bias at ") for alias in zero.aliases)
 
 
+@pytest.mark.slow
 def test_a_strip_that_hangs_slack_in_its_grips_is_no_permanent_set(tmp_path: Path) -> None:
     rivals = effects.cable_slack, effects.permanent_set, effects.force_sensor_bias
     verdict = diagnosed(tmp_path, "specimen", "cable_slack", 1171, "coloured", *rivals)

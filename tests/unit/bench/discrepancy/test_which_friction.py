@@ -44,6 +44,7 @@ def test_sharp_friction_in_slow_motion_is_coulombs(body: str, tmp_path: Path) ->
     assert found.complete
 
 
+@pytest.mark.slow
 def test_friction_that_falls_with_speed_keeps_its_numbers(tmp_path: Path) -> None:
     found = named(Machine(friction=falling, size=0.25, quickest=0.5), tmp_path)
     (effect,) = found.effects
@@ -51,6 +52,7 @@ def test_friction_that_falls_with_speed_keeps_its_numbers(tmp_path: Path) -> Non
     assert [value for value, _, _ in effect.parameters.values()] == pytest.approx([0.1, 0.1, 0.1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_coulomb_and_load_friction_on_a_weight_of_one_sign_are_one_class_with_friction_of_a_place(
     tmp_path: Path,
 ) -> None:

@@ -310,6 +310,7 @@ def test_encoders_that_are_sampled_in_turn_are_no_fault(
     assert float(late[1]) == pytest.approx(0.4, abs=0.02)
 
 
+@pytest.mark.slow
 def test_encoders_that_are_sampled_in_turn_hide_no_damping(tmp_path: Path) -> None:
     """The belt's damping is missing, and the load's encoder is read 0.6 of a sample before the motor's."""
     whole = _AXIS.replace("2e-5", "1e-4")

@@ -157,6 +157,7 @@ def test_a_size_is_met_by_a_coarser_table_that_says_what_it_costs(designs):
     assert f"at most {design.table_torque_error.largest:.2g} N·m" in str(design)
 
 
+@pytest.mark.slow
 def test_a_size_that_cannot_be_met_is_refused_with_its_cost_and_the_smallest():
     model = of_deck("austin2015_figure_consistent")
     for grid, words in (
