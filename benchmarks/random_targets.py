@@ -36,8 +36,10 @@ _LIMITS: dict[str, type] = {
         design_room.MaximumCamRadius,
         design_room.MaximumCableTension,
         design_room.MaximumLastingStrain,
+        design_room.MaximumPressureAngle,
         design_room.MaximumStrain,
         design_room.MaximumStress,
+        design_room.MinimumHollowRadius,
         design_room.MinimumRadiusOfCurvature,
     )
 }
@@ -172,18 +174,21 @@ def followed(
     actuator
         As it was.
     advice
-        Names to free, or a limit to move with names to free besides, or another spring.
+        Names to free, or a limit to move with names to free besides, or another spring with both.
     free, keep
         So far.
     """
+    gives: tuple[Give, ...] = ()
     if isinstance(advice, OtherSpring):
-        return advice.machine, list(free), list(keep)
-    give, freed = (None, advice) if isinstance(advice, Freed) else advice
+        actuator, freed, gives = advice.machine, advice.freed, advice.gives
+    elif isinstance(advice, Freed):
+        freed = advice
+    else:
+        gives, freed = advice[:1], advice[1]
+    moved = {_LIMITS[give.bound.limit]: give.moved for give in gives}
     names = [*free, *(freed.names if freed is not None else ())]
-    if give is None:
-        return actuator, names, list(keep)
-    kind = _LIMITS[give.bound.limit]
-    return actuator, names, [*(each for each in keep if type(each) is not kind), kind(give.moved)]
+    kept = [each for each in keep if type(each) not in moved]
+    return actuator, names, [*kept, *(kind(end) for kind, end in moved.items())]
 
 
 @dataclass(frozen=True)

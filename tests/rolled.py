@@ -36,6 +36,30 @@ def rolled_over(points: Array, radius: float, angle: float) -> tuple[float, floa
     return float(heights[first]), float(heights[first]) * away / math.sqrt(radius**2 - away**2)
 
 
+def laid_on(outline: Array, radius: float, angle: float) -> tuple[float, float]:
+    """Height on the y axis at which a circle lies on a closed clockwise outline of arcs, and its lever arm.
+
+    The outline, shape (n, 3), is turned anticlockwise. The circle's centre lies on an arc about the same
+    centre, larger or smaller by the radius, from which the normal leads to it.
+    """
+    upwards, place = 1j * np.exp(-1j * angle), outline[:, :2] @ [1.0, 1.0j]
+    curved = outline[:, 2] != 0.0
+    chords, sweeps = (np.roll(place, -1) - place)[curved], 4.0 * np.arctan(outline[curved, 2])
+    along, sizes = chords / np.abs(chords), np.abs(chords) / 2.0 / np.sin(sweeps / 2.0)
+    centres = place[curved] + chords / 2.0 + 1j * along * sizes * np.cos(sweeps / 2.0)
+    found = []
+    for side in (1.0, -1.0):
+        across = np.conj(upwards) * centres
+        with np.errstate(invalid="ignore"):
+            heights = across.real + side * np.sqrt((sizes - radius) ** 2 - across.imag**2)
+        normals = (centres - heights * upwards) / (sizes - radius)
+        turned = np.angle(normals / (1j * along * np.exp(-0.5j * sweeps))) * np.sign(sweeps)
+        on_it = (turned > -1e-5) & (turned < np.abs(sweeps) + 1e-5)
+        found += list(zip(heights[on_it], np.angle(normals[on_it] / upwards), strict=True))
+    height, leaning = max(found)
+    return float(height), float(height * math.tan(leaning))
+
+
 @dataclass(frozen=True)
 class Balance:
     """Forces on a roller that is moved along a guide with dry friction, and the torque on its cam."""

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import click
 
@@ -32,11 +32,13 @@ _LINE = "repeatable; a line as in a design file, for instance"
 _ENTRY = re.compile(r"""\s*([\w.-]+|"[^"]*"|'[^']*')\s*=""")
 _FORMS = {
     "target": 'ExponentialTorque = {maximum = "0.3 N*m", angle = "60 deg", shape = 1.0}',
+    "back_target": 'PowerTorque = {coefficient = 1.0, exponent = 1.0, angle = "20 deg"}',
     "limit": 'MaximumCamRadius = {radius = "20 mm"}',
     "goal": "TorqueError = {}",
     "stock": '"spring.cam.elements" = [1, 2, 4]',
 }
 """How an entry of each option is written."""
+_SIDES = ("front.html", "back.html", "cam_back.csv")
 _TASK_FILES = ("task_curve.svg", "task_motor.svg", "task_springs.svg")
 
 
@@ -48,6 +50,8 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
 
     job = _job(**given)
     never = set() if job.settings.draws else {"tolerance.svg"}
+    if job.back is not None:
+        return [*_SIDES, *(name for name in DESIGN_FILES if name.startswith(("model", "cam")))]
     names = [
         name for name in ("report.html", *DESIGN_FILES) if name not in never or (given["out"] / name).exists()
     ]
@@ -72,6 +76,10 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
     help="Design file (TOML) with target, free names, limits, goals, stock.",
 )  # fmt: skip
 @click.option("--target", default=None, help="Target curve: 'PowerTorque = {coefficient = 4.35, ...}'.")
+@click.option(
+    "--back-target", default=None,
+    help="Curve for negative angles of a LopsidedCam, both signs turned: 'PowerTorque = {...}'.",
+)  # fmt: skip
 @click.option(
     "--target-file", type=NamedPath(dir_okay=False), default=None,
     help="Target curve as CSV with units in its heads.",
@@ -114,14 +122,17 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
     from ..regeneration import range_remarks
 
     actuator, job = machine_of(deck_name), _job(**given)
+    job = dataclasses.replace(job, spring=given["spring"] or job.spring)
     steps = Steps()
     target = _target_of(job, actuator, out, steps)
+    if job.back is not None:
+        _both_sides(actuator, deck_name, (target, job.back), job=job, out=out, as_json=as_json)
     with steps.step("design"):
         designed = design_cam(
             actuator,
             target=target,
             free=job.free,
-            spring=given["spring"] or job.spring,
+            spring=job.spring,
             keep=job.keep,
             goals=job.goals,
             settings=_with_progress(job, steps.note),
@@ -151,6 +162,31 @@ def design(context: click.Context, /, deck_name: str, out: Path, as_json: bool, 
     sys.exit(0 if designed.met else 1)
 
 
+def _both_sides(
+    actuator: Assembly, deck: str, targets: tuple[Target, Target], *, job: DesignJob, out: Path, as_json: bool
+) -> NoReturn:
+    """Design both contours of a cam whose sides differ; write deck, drawings and a report of each side."""
+    from ..design import design_sides, design_summary, machined_cam, write_sides
+    from ..presentation.report import write_design_report
+
+    both = design_sides(
+        actuator, targets=targets, free=job.free, keep=job.keep, spring=job.spring, goals=job.goals,
+        settings=job.settings,
+    )  # fmt: skip
+    files = [*write_sides(both, out, machined=machined_cam(both.front, job) if both.met else None)]
+    sides = {"front": both.front, "back": both.back}
+    files += [write_design_report(out / f"{name}.html", side, deck=deck) for name, side in sides.items()]
+    if as_json:
+        numbers = {name: design_summary(side) for name, side in sides.items()}
+        show_json({**numbers, "chosen_by": both.chosen_by, "files": files})
+    else:
+        for name, side in sides.items():
+            show_table(f"Design, {name}", ("what", "value"), side.rows())
+        click.echo(f"what both sides share was chosen by the {both.chosen_by}")
+        click.echo("written: " + ", ".join(str(path) for path in files))
+    sys.exit(0 if both.met else 1)
+
+
 def _job(**given: Any) -> DesignJob:
     """Return what is asked for, from a design file or from the options."""
     from ..design import (
@@ -160,12 +196,14 @@ def _job(**given: Any) -> DesignJob:
         DesignSettings,
         Goal,
         Limit,
+        back_of,
         read_entries,
         read_job,
         read_stock,
+        read_target_entry,
     )
 
-    options = ("target", "target_file", "maximum", "angle", "free", "limit", "goal", "stock")
+    options = ("target", "back_target", "target_file", "maximum", "angle", "free", "limit", "goal", "stock")
     if given["task_file"] is not None:
         doubled = [f"--{name.replace('_', '-')}" for name in options if given[name]]
         if doubled:
@@ -175,7 +213,7 @@ def _job(**given: Any) -> DesignJob:
             )  # fmt: skip
         return _searched(read_job(given["task_file"]), given)
     for option in _FORMS:
-        for text in filter(None, [given[option]] if option == "target" else given[option]):
+        for text in filter(None, [given[option]] if option.endswith("target") else given[option]):
             if not _ENTRY.match(text):
                 raise ValueRangeError(
                     f"--{option} '{text}'", "is not NAME = {...}", next_step=f"write {_FORMS[option]}"
@@ -192,6 +230,9 @@ def _job(**given: Any) -> DesignJob:
         goals=tuple(goals) or GOALS,
         spring=None,
         settings=DesignSettings(draws=DRAWS),
+        back=back_of(read_target_entry(given["back_target"], "--back-target")[0])
+        if given["back_target"]
+        else None,
     )
     return _searched(job, given)
 

@@ -40,6 +40,7 @@ from .drawing.making import process_of as process_of
 from .drawing.rolling_cam import MachinedPair, MachinedRollerCam
 from .jobs.job_file import DRAWS as DRAWS
 from .jobs.job_file import DesignJob, TaskTarget, job_of, read_job
+from .jobs.job_file import back_of as back_of
 from .jobs.job_file import kinds as kinds
 from .jobs.job_file import read_entries as read_entries
 from .jobs.job_file import read_stock as read_stock
@@ -52,6 +53,7 @@ from .jobs.written_design import (
     write_part,
     write_sides,
 )
+from .jobs.written_design import machined_cam as machined_cam
 from .optimisation.coil_limits import (
     GoodmanSafety,
     MaximumPressureAngle,
@@ -59,6 +61,7 @@ from .optimisation.coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    PressedContact,
     RoomBetweenPivots,
 )
 from .optimisation.defaults import DesignSettings, safe_limits
@@ -164,6 +167,7 @@ __all__ = [
     "PolynomialTorque",
     "PositiveStiffness",
     "PowerTorque",
+    "PressedContact",
     "PretensionRange",
     "RestLengthRange",
     "RoomBetweenPivots",

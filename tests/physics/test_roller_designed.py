@@ -27,8 +27,8 @@ from nlsdesign.design import (
 from nlsdesign.design.statics.contour import RollerContour
 from nlsdesign.foundation.quantity import quantity
 from tests.cam_cases import CONTOUR, PRETENSION, actuator
-from tests.dxf_reading import entities_of, header_of, offset_points, polylines_of
-from tests.rolled import rolled_over, way_of
+from tests.dxf_reading import entities_of, header_of, polylines_of
+from tests.rolled import laid_on, way_of
 
 QUICK = DesignSettings(starts=2, draws=0, look_for_size_ranges=False)
 HILLS = TabulatedTorque(
@@ -150,16 +150,19 @@ def test_a_circle_rolled_over_the_drawn_edge_gives_way_and_torque(
     text = drawn(design, tmp_path)
     assert header_of(text)["$INSUNITS"].strip() == "4", "drawing units are not millimetres"
     (edge,) = polylines_of(text, "EDGE")
-    points, roller = offset_points(edge, 0.0, step=1e-4), 1e3 * contour.roller_radius
     end = float(contour.angles[-1])
     angles = np.linspace(-end, end, 121)
-    heights, arms = np.array([rolled_over(points, roller, angle) for angle in angles]).T
+    heights, arms = np.array([laid_on(edge, 1e3 * contour.roller_radius, angle) for angle in angles]).T
     claimed = 1e3 * np.interp(np.abs(angles), contour.angles, contour.centre_radii)
     assert heights == pytest.approx(claimed, abs=1e-3 * float(np.ptp(claimed)))
     # The torque of that way and of the direction in which the edge pushes the roller.
     stiffness = 1186.0 if which == "hills" else 1e6 * 1e-4 / 12.5e-3
     extension = design.values["spring.pretension"].number + 1e-3 * (heights - heights[60])
     torques = 2.0 * stiffness * extension * 1e-3 * arms
+    arms = np.sign(angles) * np.interp(np.abs(angles), contour.angles, contour.lever_arms)
+    ways = 1e-3 * (claimed - claimed[60])
+    promised = 2.0 * stiffness * (design.values["spring.pretension"].number + ways) * arms
+    assert torques == pytest.approx(promised, abs=1e-3 * design.target.largest)
     wanted = np.sign(angles) * design.target.torque(np.abs(angles))
     assert np.sqrt(np.mean((torques - wanted) ** 2)) < 0.005 * design.target.largest
 

@@ -22,9 +22,9 @@ from .machined_cam import DrawnCam, MachinedCam, derived_size
 _CHECKED = 33
 _RUN_OUT = 9
 """Nodes over the run-out."""
-_ROLLED = 2e-8
-"""Largest distance in m between the arcs and an edge that rolls on its mirror image: there the direction of
-the edge makes the torque, not its place."""
+_ROLLED = 5e-9
+"""Largest distance in m between the arcs and an edge on which something rolls: there the direction of the
+edge makes the torque, not its place, and it errs by the power 2/3 of this."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -217,4 +217,4 @@ def _arcs_along(bearings: Array, way: Array, radius: float) -> tuple[ArcPath, fl
         error = float(np.max(away))
         return path, error if math.isfinite(error) else math.inf
 
-    return few_arcs(over, bearings)
+    return few_arcs(over, bearings, _ROLLED)

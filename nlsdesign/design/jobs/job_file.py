@@ -164,7 +164,18 @@ _PLACES = ("series", "beside")
 
 Asked = TypeVar("Asked")
 
-_TABLES = ("spring", "free", "target", "limits", "goals", "stock", "search", "tolerance", "drawing")
+_TABLES = (
+    "spring",
+    "free",
+    "target",
+    "back_target",
+    "limits",
+    "goals",
+    "stock",
+    "search",
+    "tolerance",
+    "drawing",
+)
 DRAWS = 1000
 _NO_FILE = Deck("", "", Path("design"), {}, {})
 _SEARCH = ("starts", "seed", "largest_error")
@@ -192,6 +203,8 @@ class DesignJob:
         Of the search.
     drawing
         The table of that name, as read.
+    back
+        Torque curve for negative angles with both signs turned, of a cam whose sides differ.
     deck
         The whole file with the places of its names, where there is one.
     """
@@ -204,6 +217,7 @@ class DesignJob:
     spring: str | None
     settings: DesignSettings
     drawing: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+    back: Target | None = None
     deck: Deck = _NO_FILE
 
 
@@ -320,6 +334,7 @@ def job_in(deck: Deck) -> DesignJob:
         spring=None if "spring" not in deck.tables else str(deck.tables["spring"]),
         settings=_placed(lambda: DesignSettings(**values), deck.place("search")),
         drawing=_table(deck, "drawing"),
+        back=back_of(_target(deck, "back_target")[0]) if "back_target" in deck.tables else None,
         deck=deck,
     )
 
@@ -335,13 +350,20 @@ def kinds(base: type) -> dict[str, type]:
     return dict(sorted(result.items()))
 
 
-def _target(deck: Deck) -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
+def back_of(target: Target | TaskTarget) -> Target:
+    """Return the target of a side, which is a curve."""
+    if isinstance(target, Target):
+        return target
+    raise DeckError("back_target", "is a task", next_step="give a curve, one for each side of the cam")
+
+
+def _target(deck: Deck, key: str = "target") -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
     """Return the target, and the band that stands beside it in its file."""
-    table = _table(deck, "target")
+    table = _table(deck, key)
     if len(table) != 1:
         rule = f"has {len(table)} entries, a design has one target" if table else "none is given"
         raise DeckError(
-            deck.place("target"), rule,
+            deck.place(key), rule,
             next_step=f'{"keep" if table else "write"} one of: file = "...", '
                       f'TaskTarget, {", ".join(kinds(Target))}',
         )  # fmt: skip
@@ -349,8 +371,8 @@ def _target(deck: Deck) -> tuple[Target | TaskTarget, tuple[Limit, ...]]:
     if name == "file":
         return target_of_file(deck.path.parent / str(given))
     if name == "TaskTarget":
-        return built(deck, TaskTarget, given, deck.place("target.TaskTarget")), ()
-    (target,) = _objects(deck, "target", Target)  # type: ignore[type-abstract]
+        return built(deck, TaskTarget, given, deck.place(f"{key}.TaskTarget")), ()
+    (target,) = _objects(deck, key, Target)  # type: ignore[type-abstract]
     return target, ()
 
 

@@ -285,7 +285,7 @@ class MinimumHollowRadius(Limit):
 
 @dataclass(frozen=True)
 class RoomBetweenPivots(Limit):
-    """The element, stretched by the pretension, fits between the pivots of a rolling pair, and always pulls.
+    """The element, stretched by the pretension, fits between the pivots of a rolling pair.
 
     Parameters
     ----------
@@ -304,7 +304,7 @@ class RoomBetweenPivots(Limit):
         self.number("beside", "m", 0.0, 1.0)
 
     def bounds(self, design: DesignPoint) -> Iterator[Bound]:
-        """Yield one bound for each piece of rubber and each coil, and one over the angle.
+        """Yield one bound for each piece of rubber and each coil.
 
         Raises
         ------
@@ -322,4 +322,18 @@ class RoomBetweenPivots(Limit):
             room = free - design.parameters[name]
             least = plain(self.beside)
             yield self.bound(f"room beside {name}", room, least, upper=False, unit="mm", scale=_SIZE)
+
+
+@dataclass(frozen=True)
+class PressedContact(Limit):
+    """The element is stretched at every angle, so that it presses what rolls on a cam against it.
+
+    Examples
+    --------
+    >>> PressedContact()
+    PressedContact()
+    """
+
+    def bounds(self, design: DesignPoint) -> Iterator[Bound]:
+        """Yield one bound over the angle."""
         yield self.bound("extension", design.extensions, 0.0, upper=False, unit="mm", scale=_SIZE)

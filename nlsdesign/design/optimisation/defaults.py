@@ -24,6 +24,7 @@ from .coil_limits import (
     MaximumTravel,
     MinimumHollowRadius,
     MinimumSpringIndex,
+    PressedContact,
     RoomBetweenPivots,
 )
 from .limits import (
@@ -170,6 +171,8 @@ def _declared(model: FlatModel, spring: str | None) -> Iterator[Limit]:
         radius = values[cam.cable.diameter] * values[cam.cable.bend_ratio] / 2.0
         yield MinimumRadiusOfCurvature(radius)
         yield MaximumCableTension(values[cam.cable.breaking_force] / CABLE_FACTOR)
+    if cam.rolling is not None:
+        yield PressedContact()
     if cam.rolling is not None and cam.rolling.radius is None:
         yield MinimumRadiusOfCurvature(TOOTH_RADIUS)
         yield RoomBetweenPivots()

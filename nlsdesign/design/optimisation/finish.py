@@ -370,6 +370,8 @@ def limit_state(problem: DesignProblem, bound: Bound, point: Array) -> LimitStat
     values = problem.evaluate(bound.expression, point)
     value = float(values.max() if bound.upper else values.min())
     active = abs(value - bound.value) <= _ACTIVE * bound.scale
+    if abs(value - bound.value) <= _AT_END * bound.scale:
+        value = bound.value
     read, end = bound.read(value), bound.read(bound.value)
     angles = problem.evaluate(problem.design.angles, point)
     where = ""

@@ -8,7 +8,7 @@ Why no design keeps all limits: which are in conflict, how much each would have 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import casadi as ca
 import numpy as np
@@ -27,6 +27,8 @@ _STARTS = 4
 _MOST = 1e3
 _HOLLOW = 1e-6
 """Radius of curvature below zero, relative to the size of the contour, from which it counts as hollow."""
+_SURE = 0.7
+"""Share of the allowed error that another spring is asked for: the finished cam adds some between nodes."""
 _SHOWS = 0.01
 """Part of the deepest hollow from which a place is named."""
 
@@ -38,9 +40,12 @@ class OtherSpring:
     words: str  # what it is
     machine: Assembly  # the actuator with it, not designed yet
     error: float  # rms torque error in N·m that is then left
+    freed: Freed | None = None  # what has to be freed besides
+    gives: tuple[Give, ...] = ()  # limits that would have to move besides
 
     def __str__(self) -> str:
-        return f"take {self.words}"
+        besides = [] if self.freed is None else [str(self.freed)]
+        return ", ".join([f"take {self.words}", *besides, *map(str, self.gives)])
 
 
 def percent(error: float, largest: float) -> str:
@@ -48,9 +53,16 @@ def percent(error: float, largest: float) -> str:
     return f"{100.0 * error / largest:.2g} % of the largest torque"
 
 
-def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...]:
-    """Return the other springs for which a cam was found within the limits."""
-    springs = []
+def other_springs(
+    search: Search, free: Sequence[str], allowed: float | None = None
+) -> tuple[OtherSpring, ...]:
+    """Return the other springs for which a cam was found within the limits.
+
+    Where none leaves less than the ``allowed`` error, the first that does with sizes freed besides stands
+    before them, or else the one that does with limits moved least.
+    """
+    springs: list[OtherSpring] = []
+    designs: list[tuple[Search, list[str], Array]] = []
     for words, machine in _others(search):
         try:
             question = search.question.of(machine)
@@ -64,7 +76,28 @@ def other_springs(search: Search, free: Sequence[str]) -> tuple[OtherSpring, ...
         if outcomes:
             best = min(outcomes, key=lambda outcome: outcome.cost)
             springs.append(OtherSpring(words, machine, other.problem.rms(best.point)))
-    return tuple(springs)
+            designs.append((other, kept, best.point))
+    if allowed is None or any(one.error <= allowed for one in springs):
+        return tuple(springs)
+    sure = _SURE * allowed
+    loosened = [Loosened(other, kept, largest_error=sure, best=at) for other, kept, at in designs]
+    for spring, loose in zip(springs, loosened, strict=True):
+        for freed in loose.sizes_tried().enough[:1]:
+            return (replace(spring, error=freed.error, freed=freed), *springs)
+    ways = [way for way in map(_with_limits, springs, loosened) if way is not None]
+    least = sorted(ways, key=lambda way: sum(give.amount / give.bound.scale for give in way.gives))
+    return (*least[:1], *springs)
+
+
+def _with_limits(spring: OtherSpring, loose: Loosened) -> OtherSpring | None:
+    """Return another spring with all sizes freed and limits moved as little as is enough, or ``None``."""
+    limits = [i for i in range(len(loose.bounds)) if i != loose.error]
+    outcome = loose.least(loose.candidates, limits)
+    gives = [loose.give(i, outcome) for i in limits if not _nothing(loose.give(i, outcome))]
+    if not outcome.solved or not all(give.sensible for give in gives):
+        return None
+    freed = loose.freed(loose.candidates, outcome)
+    return replace(spring, error=freed.error, freed=freed if freed.names else None, gives=tuple(gives))
 
 
 def _others(search: Search) -> Iterator[tuple[str, Assembly]]:
@@ -211,7 +244,7 @@ def find_remedies(
     gives = tuple((give, also) for give, also in gives if not _nothing(give))
     if enough or gives:
         return Remedies(enough, tuple(better), gives, everything)
-    others = other_springs(search, free)
+    others = other_springs(search, free, allowed)
     return Remedies((), tuple(better), (), everything, others, hollow_contour(loose))
 
 

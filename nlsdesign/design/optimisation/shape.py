@@ -170,8 +170,8 @@ class RollerVariables(FreeContour):
         return {v.name: each for v, each in zip(self.slopes, slopes.tolist(), strict=True)}
 
     def held(self, design: DesignPoint, arm: float, *, curved: bool) -> list[Bound]:
-        """Return that the element presses the roller on the cam."""
-        return [held("PressedRoller", "extension of the element", design.extensions, arm)]
+        """Return nothing: the edge may be hollow."""
+        return []
 
     def made(self, design: DesignPoint, value: Callable[[Expression], Array]) -> Contour:
         """Return the contour at a solution: a slope that is straight between nodes, integrated exactly."""

@@ -202,6 +202,12 @@ def _rows(
     design: DesignPoint, sensitivities: _Sensitivities, rules: SpreadRules
 ) -> list[tuple[Spread, Expression]]:
     """Return the spreads that change the torque at rest, each with its change per standard deviation."""
+    if design.cam.rolling is not None:
+        raise ArrangementError(
+            f"cam '{design.cam.name}'",
+            f"has {design.cam.rolling.what}, which goals over the spreads do not know",
+            next_step="leave them out; tolerance_analysis looks at the design that comes out",
+        )  # fmt: skip
     causes = spring_causes(design.model, design.cam.drive, rules)
     rows = [(cause.spread, sensitivities.row(cause)) for cause in causes]
     rows += [(_SINCE, -_SINCE.slope(0.0) * lost) for lost in (*lost_by_set(design), *lost_by_creep(design))]

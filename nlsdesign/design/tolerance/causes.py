@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 
 from ...foundation.arrays import Array
-from ...foundation.errors import ArrangementError, unknown_name
+from ...foundation.errors import unknown_name
 from ...foundation.quantity import Quantity
 from ...foundation.spread import EXACT, NormalSpread, RelativeSpread, Spread
 from ...model import FlatModel, Variable
@@ -92,9 +92,9 @@ class AnchorCause(Cause):
 
 @dataclass(frozen=True)
 class WaveCause(Cause):
-    """An error of the contour's support function, a·cos(kπφ/φ_e) over the direction φ of the cable.
+    """An error of the edge along its normal, a·cos(kπφ/φ_e) over the direction φ of the cable, or the angle.
 
-    With k = 0 it is an offset: a tool of another radius, or a thicker cable.
+    With k = 0 it is an offset: a tool of another radius, or a thicker cable or roller.
     """
 
     order: int
@@ -168,6 +168,7 @@ _PRETENSION = _Assumed(1e-4, "assumed: set by a screw of 0.5 mm pitch to a fifth
 _ANCHOR = _Assumed(2e-4 / math.sqrt(3.0), "assumed: place of a hole within ± 0.2 mm, each place as likely")
 _CONTOUR = _Assumed(5e-5 / math.sqrt(3.0), "assumed: edge within ± 0.05 mm, each place as likely")
 _CABLE = _Assumed(2.5e-5 / math.sqrt(3.0), "assumed: diameter within ± 0.05 mm, each size as likely")
+_ROLLER = _Assumed(2e-6 / math.sqrt(3.0), "assumed: a bearing, diameter from −8 to 0 µm, each size as likely")
 
 
 @dataclass(frozen=True)
@@ -196,12 +197,6 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     ``spring``: path of the cam spring; decided from the structure if it is left out.
     """
     cam = series_cam(model, spring)
-    if cam.rolling is not None:
-        raise ArrangementError(
-            f"cam '{cam.name}'",
-            f"has {cam.rolling.what}; how an error of its edge acts on the torque is not known yet",
-            next_step="leave tolerance goals out and ask for no draws, or sweep the numbers of the deck",
-        )  # fmt: skip
     tie = next(each for each in model.springs if cam in each.cams)
     # The numbers of the spring that move together, by name.
     inside = set(tie.parameters) - set(_not_of_the_torque(cam))
@@ -220,14 +215,7 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
             groups |= {v.name: [v] for row in moduli.values() for v in row}
         elif moduli:
             groups[f"{piece.name}.moduli"] = [v for row in moduli.values() for v in row]
-    # What deviates besides the numbers: the edge of the cam, and the cable on it.
-    cable = _CABLE
-    if cam.cable is not None:
-        diameter = model.variable(cam.cable.diameter)
-        if diameter.spread:
-            of_radius = diameter.spread.standard_error(diameter.start) / 2.0
-            cable = _Assumed(of_radius, f"declared: {diameter.spread_text}")
-    others = {f"{cam.name}.contour": _CONTOUR, f"{cam.name}.cable_radius": cable}
+    others = {f"{cam.name}.contour": _CONTOUR, **_on_the_edge(model, cam)}
     valid = [*groups, *others]
     for name in rules.given:
         if name not in valid:
@@ -246,8 +234,26 @@ def spring_causes(model: FlatModel, spring: str | None, rules: SpreadRules) -> t
     return tuple(cause for cause in causes if cause.deviation > 0.0)
 
 
+def _on_the_edge(model: FlatModel, cam: CamNames) -> dict[str, _Assumed]:
+    """Return by how much the radius of the cable or roller deviates, by name; equal cams have none."""
+    if cam.rolling is not None and cam.rolling.radius is None:
+        return {}
+    name, size, per_size, assumed = f"{cam.name}.cable_radius", "", 0.5, _CABLE
+    if cam.rolling is not None and cam.rolling.radius is not None:
+        name, size, per_size, assumed = cam.rolling.radius, cam.rolling.radius, 1.0, _ROLLER
+    elif cam.cable is not None:
+        size = cam.cable.diameter
+    declared = model.variable(size) if size else None
+    if declared is not None and declared.spread:
+        deviation = per_size * declared.spread.standard_error(declared.start)
+        assumed = _Assumed(deviation, f"declared: {declared.spread_text}")
+    return {name: assumed}
+
+
 def _not_of_the_torque(cam: CamNames) -> Iterator[str]:
-    """Yield the numbers of strength and cable, of which only the diameter does anything to the torque."""
+    """Yield the numbers that do nothing to the torque, or act as an error of the edge."""
+    if cam.rolling is not None:
+        yield from (name for name in (cam.rolling.base, cam.rolling.radius) if name is not None)
     for piece in cam.specimens:
         idle = (piece.tensile_strength, piece.elongation_at_break, piece.tension_set)
         yield from (name for name in idle if name is not None)

@@ -15,6 +15,12 @@ length of the cable,
     ∂h/∂D = −p·p'/(D·f),      ∂δ/∂D = √(D² − p²)/D − 1.
 
 A contour that is hollow somewhere is treated as if the cable could follow it.
+
+What rolls on a made edge is moved by the error ε(θ) along the normal at the contact, to first order
+
+    Δδ = g·ε − (g·ε)(0),    Δh = d(g·ε)/dθ,    g = 1/cos α of a roller,    g = 2 of two cams cut alike,
+
+with the pressure angle α; the pretension is set on the made part. So a slope of the edge makes the torque.
 Source: Schneider 2014 (support function of a convex curve); virtual work.
 """
 
@@ -189,6 +195,28 @@ class MadeCam:
         return arms, np.concatenate([[0.0], np.cumsum(steps)])
 
 
+@dataclass(frozen=True, eq=False)
+class RolledCam(MadeCam):
+    """The edge of a cam on which something rolls, over the angle."""
+
+    reach: Array  # g at the angles, shape (n,)
+
+    def deviating(self, causes: Sequence[Cause], deviations: Array) -> tuple[Array, Array]:
+        """Return lever arms and extensions of made cams, to first order."""
+        changes = np.array([self.sensitivity(cause) for cause in causes])
+        return self.lever_arms + deviations @ changes[:, 0], self.extensions + deviations @ changes[:, 1]
+
+    def sensitivity(self, cause: Cause) -> tuple[Array, Array]:
+        """Return dh and dδ per standard deviation of a cause, shape (n,) each, in m."""
+        if not isinstance(cause, WaveCause):
+            return super().sensitivity(cause)
+        turned = cause.order * np.pi / self.angles[-1]
+        error, slope = np.cos(turned * self.angles), -turned * np.sin(turned * self.angles)
+        way = cause.deviation * self.reach * error
+        arms = cause.deviation * (np.gradient(self.reach, self.angles) * error + self.reach * slope)
+        return arms, way - way[0]
+
+
 def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[Cause]) -> MadeCam:
     """Return the contour of a declared cam.
 
@@ -221,13 +249,20 @@ def made_cam(law: ElasticLaw, cam: ca.Function, angles: Array, causes: Sequence[
         slopes[1:] = np.gradient(values[1:], nodes, axis=1)
     splines = [scipy.interpolate.CubicHermiteSpline(nodes, v, s) for v, s in zip(values, slopes, strict=True)]
     stretched = ca.Function("extension", [angle, parameters], [extension])(angles.reshape(1, -1), numbers)
-    return MadeCam(
+    made = MadeCam(
         angles=angles,
         anchor=anchor,
         table=splines[0],
         profiles={cause.name: spline for cause, spline in zip(profiles, splines[1:], strict=True)},
         extensions=np.array(stretched, dtype=float).ravel(),
     )
+    rolling = law.cam.rolling
+    if rolling is None:
+        return made
+    centre = numbers[names.index(rolling.base)] + made.extensions
+    tilts = splines[0](angles) / centre
+    reach = np.full_like(angles, 2.0) if rolling.radius is None else np.hypot(1.0, tilts)
+    return RolledCam(**vars(made), reach=reach)
 
 
 def losses_of(causes: Sequence[Cause], angles: Array) -> Array:

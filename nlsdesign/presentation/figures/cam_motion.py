@@ -426,7 +426,7 @@ def rolling_picture(design: CamDesign, contour: RollingContour) -> Figure:
     figure, axes = panels(2, 1, height=0.5 * WIDTH, sharex=True)
     for panel, angle in zip(axes, (0.0, last), strict=True):
         draw_rolling(panel, design, contour, angle)
-        panel.set(xlim=(-reach, reach), ylim=(-reach, reach))
+        panel.set(xlim=(-reach, reach), ylim=(-1.1 * MM * float(contour.radii.max()), reach))
     axes[1].set_xlabel("distance from the axis in mm")
     what, more = "another that rolls on it", f"pivots {MM * contour.centre_radii[0]:.1f} mm apart at 0°"
     if isinstance(contour, RollerContour):

@@ -63,12 +63,14 @@ def data_sheet(design: CamDesign, *, deck: str) -> Figure:
         linestyle=(0, (4, 2)), label="target",
     )  # fmt: skip
     axes.set(xlabel="angle in degrees", ylabel="torque in N·m", title="Torque")
-    axes.legend(loc="upper left", fontsize=7.5, frameon=False)
+    axes.legend(loc="best", fontsize=7.5, frameon=False)
     stiffness = _axes(page, _MIDDLE + 14.0, 87.0, 76.0, 54.0)
     slope = np.gradient(design.check.torques, design.check.angles)
     stiffness.plot(np.degrees(design.check.angles), slope, color=AFTER.light)
     stiffness.set(xlabel="angle in degrees", ylabel="stiffness in N·m/rad", title="Stiffness")
-    stiffness.set_ylim(bottom=min(0.0, float(slope.min())))
+    # A jump of the torque at angle zero has a stiffness that would hide all others.
+    usual = slope[len(slope) // 50 :]
+    stiffness.set_ylim(min(0.0, 1.05 * float(usual.min())), 1.05 * float(np.max(usual, initial=0.0)) or None)
     page.table((_LEFT, 74.0), (13.0, 19.0, 27.0, 14.0, 17.0), rows=_over_angle(design))
     page.table((_MIDDLE, 74.0), (58.0, 32.0), rows=_limits(design))
     for number, line in enumerate(textwrap.wrap(_ASSUMED, _LETTERS)):
@@ -101,8 +103,10 @@ def _numbers(design: CamDesign) -> list[tuple[str, ...]]:
             f"largest force of {'a cable' if design.cam.rolling is None else 'an element'}",
             f"{three_digits(float(np.max(curves.forces)))} N",
         ),
-        ("volume of all rubber", f"{three_digits(1e6 * design.rubber_volume)} cm³"),
     ]
+    if design.rubber_volume > 0.0:
+        what = "wire" if design.cam.coils else "rubber"
+        rows.append((f"volume of all {what}", f"{three_digits(1e6 * design.rubber_volume)} cm³"))
     if design.tolerance is not None and design.tolerance.causes:
         built, trims = design.tolerance.quantiles[-1], design.tolerance.trims[:1]
         rows.insert(

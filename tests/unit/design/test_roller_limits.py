@@ -23,10 +23,10 @@ from nlsdesign.design import (
     MinimumHollowRadius,
     MinimumRadiusOfCurvature,
     TabulatedTorque,
+    ToleranceQuantile,
     contour_of_cam,
     design_cam,
     job_of,
-    tolerance_analysis,
     write_drawings,
 )
 from nlsdesign.design.statics.contour import RollerContour, roller_contour
@@ -109,14 +109,16 @@ def test_without_a_part_the_edge_is_drawn_alone(tmp_path: Path) -> None:
     assert svg.read_text(encoding="utf-8").count("<path") == 5, "one outline, three lines, the axis"
 
 
-def test_a_tolerance_is_refused_and_a_design_says_so_in_a_remark() -> None:
-    with pytest.raises(ArrangementError, match="has a roller; how an error of its edge acts"):
-        tolerance_analysis(machine(), target=hill(), draws=20)
-    design = design_cam(
-        machine(), target=hill(), free=CONTOUR, keep=[STRAIN], settings=replace(QUICK, draws=20)
-    )
-    assert design.tolerance is None
-    assert any(remark.startswith("no tolerance: ") for remark in design.remarks)
+def test_goals_over_the_spreads_are_refused_and_a_design_has_its_tolerance() -> None:
+    asked = {"target": hill(), "free": CONTOUR, "keep": [STRAIN]}
+    with pytest.raises(ArrangementError, match="has a roller, which goals over the spreads do not know"):
+        design_cam(machine(), **asked, goals=[ToleranceQuantile()], settings=QUICK)
+    design = design_cam(machine(), **asked, settings=replace(QUICK, draws=20))
+    assert design.tolerance is not None
+    alone = {each.cause.name: each.alone for each in design.tolerance.causes}
+    # A slope of the edge makes the torque, its place does not.
+    assert alone["spring.cam.contour.wave"] > 2.0 * alone["spring.cam.contour.offset"] > 0.0
+    assert alone["spring.cam.roller_radius"] < 0.2 * alone["spring.cam.contour.wave"]
 
 
 def test_the_live_page_refuses_a_roller_with_the_next_step() -> None:

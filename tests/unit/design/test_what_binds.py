@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 import nlsdesign as nls
+from benchmarks.random_targets import lines, wild_target
 from nlsdesign.components import Assembly, LinearElastic, OneSidedCam, RollerCam, RollingPair
 from nlsdesign.design import (
     CamDesign,
@@ -104,6 +105,15 @@ def test_another_cam_is_named_where_it_was_tried() -> None:
     then = design_cam(one.machine, target=target, free=RUBBER, keep=keep, settings=hasty)
     assert then.predicted_rms == pytest.approx(one.error, rel=0.01)
     assert one.error < 0.7 * missed.rms
+
+
+@pytest.mark.slow
+def test_another_cam_is_named_with_the_sizes_that_it_needs() -> None:
+    """A plateau (seed 6) that neither all sizes nor another cam meets alone; the advice is followed."""
+    (line,) = lines(["austin2015_as_printed"], [6], wild_target)
+    assert line.verdict == "met after the first advice"
+    assert "take a cam with a roller follower (RollerCam)" in line.first.words
+    assert "edge may be hollow, free spring.rubber.rest_length (to " in line.first.words
 
 
 def promised(
