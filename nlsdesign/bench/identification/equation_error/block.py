@@ -99,6 +99,7 @@ class NoiseFloor:
     # shares: of the variance of the floor, from the noise of each signal that is taken as it is
     shares: Mapping[str, float] = field(default_factory=dict)
     width: float = 0.0  # standard deviation of the filter in s
+    acceleration: tuple[float, float] = (0.0, 0.0)  # power of its noise and of all of it, in squares of sigma
 
     @property
     def typical(self) -> float:

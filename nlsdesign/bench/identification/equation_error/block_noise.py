@@ -95,6 +95,9 @@ _SLOW_SHARE = 1e-2
 """Of the filter of a row that may reach into a reversal."""
 _RECTIFIED = 0.1
 """Share of the noise floor up to which a block may rectify the noise of an input: 0.01 of its square."""
+_HIDDEN = 0.05
+"""Share of the power of an acceleration that may be noise: what is in proportion to it is fitted too small by
+about as much (errors in variables), and no standard error shows it."""
 LEAST_ROWS = 20
 """Rows in which a block says anything of a record, at least."""
 LEAST_COVERED = 0.25
@@ -129,6 +132,13 @@ def block_noise(block: Block, records: RecordSet, noise: Noise, filters: Filters
             f"block '{block.name}'",
             "no record moves enough to say anything about it",
             next_step=_needed_motion(block, records, noise, filters),
+        )
+    hidden, whole = np.sum([floor.acceleration for floor in floors.values()], axis=0)
+    if hidden > _HIDDEN * (whole + 0.1**-2):  # a number that is declared to 10 % says as much
+        raise MeasurementError(
+            f"block '{block.name}'",
+            f"{100.0 * hidden / whole:.0f} % of the power of its acceleration is noise: it hides an inertia",
+            next_step="record a motion of more counts or of higher frequency, or take a finer encoder",
         )
     return BlockNoise(block, filters, floors)
 
@@ -177,29 +187,26 @@ def noise_floor(
     variance = np.full(gains.shape[1], own**2)
     raw = np.full(gains.shape[1], noise.deviation(block.target) ** 2 if block.target else 0.0)
     memory = list(noise.memory(block.target, step, width=width)) if block.target else []
-    powers = dict[str, float]()
+    powers, bent = dict[str, float](), list[tuple[Array, Array]]()
     for i, variable in enumerate(block.model.inputs):
         drive = block.drives.get(variable.name)
         if drive is None:
             continue
+        signal, order, deviation = drive.signal, drive.order, noise.deviation(drive.signal)
         # Rounding of a signal at rest is a constant error that no filter takes away.
-        constant = noise.rounded[drive.signal] and drive.order == 0
-        deviation = noise.deviation(drive.signal)
-        order = drive.order
-        behind = (
-            deviation if constant else noise.behind(drive.signal, step, width=width, order=order, span=span)
-        )
+        constant = noise.rounded[signal] and order == 0
+        behind = deviation if constant else noise.behind(signal, step, width=width, order=order, span=span)
         variance += (gains[i] * behind) ** 2
         if order == 0:
             raw += (gains[i] * deviation) ** 2
-            power = float(np.nanmean(gains[i] ** 2)) * behind**2
-            powers[drive.signal] = powers.get(drive.signal, 0.0) + power
-            parts = noise.memory(drive.signal, step, width=width)
+            powers[signal] = powers.get(signal, 0.0) + float(np.nanmean(gains[i] ** 2)) * behind**2
+            parts = noise.memory(signal, step, width=width)
             memory += [NoisePart(float(np.mean(gains[i] ** 2)) * p.variance, p.time) for p in parts]
+        elif order == 2:
+            bent.append((gains[i][at] * inputs[i], gains[i][at] * behind))
     variance, raw = variance[at], raw[at]
     shares = [NoisePart(p.variance / float(np.mean(variance)), p.time) for p in memory]
-    heard = {drive.signal for drive in block.drives.values() if drive.order == 0}
-    heard |= {block.target} if block.target else set()
+    heard = {d.signal for d in block.drives.values() if d.order == 0} | {block.target or ""} - {""}
     squares = [
         sum(independent_number(shares, max(1, round(t / spacing)), spacing) for t in noise.seen[signal])
         for signal in heard.intersection(noise.seen)
@@ -208,7 +215,9 @@ def noise_floor(
     known = min(squares, default=math.inf)
     sigma = np.sqrt(variance[rows.places])
     own_shares = {signal: power / float(np.mean(sigma**2)) for signal, power in powers.items() if len(sigma)}
-    return NoiseFloor(rows, sigma, np.sqrt(raw), independent, known, covered, own_shares, width)
+    bent_noise = sum(float(np.nansum((part[rows.places] / sigma) ** 2)) for _, part in bent)
+    power = bent_noise, sum(float(np.nansum((rows @ part / sigma) ** 2)) for part, _ in bent)
+    return NoiseFloor(rows, sigma, np.sqrt(raw), independent, known, covered, own_shares, width, power)
 
 
 def _rows(
