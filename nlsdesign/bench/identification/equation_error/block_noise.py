@@ -187,7 +187,7 @@ def noise_floor(
     variance = np.full(gains.shape[1], own**2)
     raw = np.full(gains.shape[1], noise.deviation(block.target) ** 2 if block.target else 0.0)
     memory = list(noise.memory(block.target, step, width=width)) if block.target else []
-    powers, bent = dict[str, float](), list[tuple[Array, Array]]()
+    powers, accelerations = dict[str, float](), list[tuple[Array, Array]]()
     for i, variable in enumerate(block.model.inputs):
         drive = block.drives.get(variable.name)
         if drive is None:
@@ -203,7 +203,7 @@ def noise_floor(
             parts = noise.memory(signal, step, width=width)
             memory += [NoisePart(float(np.mean(gains[i] ** 2)) * p.variance, p.time) for p in parts]
         elif order == 2:
-            bent.append((gains[i][at] * inputs[i], gains[i][at] * behind))
+            accelerations.append((gains[i][at] * inputs[i], gains[i][at] * behind))
     variance, raw = variance[at], raw[at]
     shares = [NoisePart(p.variance / float(np.mean(variance)), p.time) for p in memory]
     heard = {d.signal for d in block.drives.values() if d.order == 0} | {block.target or ""} - {""}
@@ -215,8 +215,8 @@ def noise_floor(
     known = min(squares, default=math.inf)
     sigma = np.sqrt(variance[rows.places])
     own_shares = {signal: power / float(np.mean(sigma**2)) for signal, power in powers.items() if len(sigma)}
-    bent_noise = sum(float(np.nansum((part[rows.places] / sigma) ** 2)) for _, part in bent)
-    power = bent_noise, sum(float(np.nansum((rows @ part / sigma) ** 2)) for part, _ in bent)
+    noise_power = sum(float(np.nansum((part[rows.places] / sigma) ** 2)) for _, part in accelerations)
+    power = noise_power, sum(float(np.nansum((rows @ part / sigma) ** 2)) for part, _ in accelerations)
     return NoiseFloor(rows, sigma, np.sqrt(raw), independent, known, covered, own_shares, width, power)
 
 
@@ -446,7 +446,7 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
 def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[str, float]:
     """Return by how much the noise of each input shifts the output of a block, root mean square in its unit.
 
-    A filter behind the output averages noise only where the output is straight in it. Where it is bent, as
+    A filter behind the output averages noise only where the output is straight in it. Where it is accelerations, as
     that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes
     upwards and downwards stays. Rates are smooth already, and so is a motion.
     """
