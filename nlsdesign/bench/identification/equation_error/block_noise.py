@@ -446,7 +446,7 @@ def measured_inputs(block: Block, record: Record, span: float) -> Array:
 def rectified(block: Block, record: Record, noise: Noise, span: float) -> dict[str, float]:
     """Return by how much the noise of each input shifts the output of a block, root mean square in its unit.
 
-    A filter behind the output averages noise only where the output is straight in it. Where it is accelerations, as
+    A filter behind the output averages noise only where the output is straight in it. Where it is bent, as
     that of a lossy gear where the power turns over, noise is rectified: half the sum of what it causes
     upwards and downwards stays. Rates are smooth already, and so is a motion.
     """
