@@ -80,26 +80,36 @@ fi
 rm -f "$stamp"
 
 say "installing the locked packages (once; $size) ..."
-# Half of the list each at the same time, for most of it is unpacking; whatever one half needs stands in the other.
+# uv unpacks on all cores. Where it finds nothing, as behind a mirror of which only pip knows, pip does it: half of
+# the list each at the same time, for most of it is unpacking; whatever one half needs stands in the other.
 # Not compiled here: what is imported is compiled then, and most of it never is.
-awk -v half="$venv/half" '/^[^ #]/ { odd = n++ % 2 } { print > (half (odd ? 1 : 0) ".txt") }' "$lock"
-install() {
-    "$venv/bin/python" -m pip install "$@" --no-compile --no-deps --require-hashes --only-binary :all:
+with_pip() { "$venv/bin/python" -m pip install "$@" --no-compile --no-deps --require-hashes --only-binary :all:; }
+with_uv() {
+    awk '/^[^ #]/ { mine = /^uv==/ } mine' "$lock" > "$venv/uv.txt"
+    with_pip --quiet -r "$venv/uv.txt" || return 1
+    index=${PIP_INDEX_URL:-$("$venv/bin/python" -m pip config get global.index-url 2>/dev/null || true)}
+    UV_HTTP_TIMEOUT=${UV_HTTP_TIMEOUT:-20} UV_DEFAULT_INDEX=${UV_DEFAULT_INDEX:-${index:-https://pypi.org/simple}} \
+        "$venv/bin/uv" pip install --quiet --python "$venv/bin/python" --no-deps --require-hashes \
+        --only-binary :all: -r "$lock"
 }
-install --quiet -r "$venv/half0.txt" &
-beside=$!
-trap 'kill "$beside" 2>/dev/null' INT TERM
-failed=''
-# shellcheck disable=SC2086
-install $quiet -r "$venv/half1.txt" || failed=1
-wait "$beside" || failed=1
-trap - INT TERM
-rm -f "$venv"/half?.txt
-[ -z "$failed" ] || {
+with_halves() {
+    awk -v half="$venv/half" '/^[^ #]/ { odd = n++ % 2 } { print > (half (odd ? 1 : 0) ".txt") }' "$lock"
+    with_pip --quiet -r "$venv/half0.txt" &
+    beside=$!
+    trap 'kill "$beside" 2>/dev/null' INT TERM
+    failed=''
+    # shellcheck disable=SC2086
+    with_pip $quiet -r "$venv/half1.txt" || failed=1
+    wait "$beside" || failed=1
+    trap - INT TERM
+    [ -z "$failed" ]
+}
+with_uv >"$venv/uv.log" 2>&1 || with_halves || {
     say "the locked packages could not be installed; the reason stands above. Is there a network, a proxy to set?"
     say "With a Python that is newer than the lock, try an older one:  make PYTHON=python3.13 ..."
     exit 2
 }
+rm -f "$venv"/half?.txt "$venv"/uv.txt "$venv"/uv.log
 # The build backend is in the lock, so this step needs no network.
 "$venv/bin/python" -m pip install $quiet --no-deps --no-build-isolation --no-index --editable . || {
     say "the packages are there, but nlsdesign itself could not be installed; the reason stands above."

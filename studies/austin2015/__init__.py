@@ -8,9 +8,10 @@ states why. Design, observer, torque loop and generated code are shown for both 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import cast
 
 import nlsdesign as nls
+from nlsdesign.bench.discrepancy import Verdict
 from nlsdesign.design import DesignSettings
 from nlsdesign.foundation.work_sharing import parallel_map
 
@@ -40,7 +41,7 @@ def main(out: Path, fast: bool = False) -> Results:
     with steps.step("model against the figures of the paper"):
         figures = compare_with_figures(actuator)
 
-    def branch(number: int) -> Any:
+    def branch(number: int) -> ActuatorResults | Verdict:
         """Do what needs nothing of the others, so that each may have a core of its own."""
         if number == 1:
             catalogue, without = (RIVALS, SLOWEST) if fast else (None, ())
@@ -50,7 +51,8 @@ def main(out: Path, fast: bool = False) -> Results:
         deck = out / ("designed.toml" if number else "actuator.toml")
         return work_up(machine, deck, out / name, steps=steps, fast=fast)
 
-    published, verdict, designed = parallel_map(branch, 3)
+    whole = cast("tuple[ActuatorResults, Verdict, ActuatorResults]", tuple(parallel_map(branch, 3)))
+    published, verdict, designed = whole
     both = {"published": published, "designed": designed}
     with steps.step("the diagnosed actuator under code from three decks"):
         codes = {
