@@ -55,9 +55,20 @@ def _parsed(file: Path, changed: int) -> ast.Module:
     return ast.parse(file.read_text(encoding="utf-8"), filename=str(file))
 
 
+def walk(tree: ast.AST) -> Iterable[ast.AST]:
+    """Return all nodes; those of a module are listed once."""
+    return _listed(tree) if isinstance(tree, ast.Module) else ast.walk(tree)
+
+
+@functools.lru_cache(maxsize=600)
+def _listed(tree: ast.Module) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(tree))
+
+
 def forget() -> None:
     """Let go of the trees, which together take hundreds of megabytes."""
     _parsed.cache_clear()
+    _listed.cache_clear()
 
 
 def lines_of(file: Path, nodes: Iterable[ast.AST] | None = None) -> Lines:
@@ -65,7 +76,7 @@ def lines_of(file: Path, nodes: Iterable[ast.AST] | None = None) -> Lines:
     text = file.read_text(encoding="utf-8").splitlines()
     docstrings: set[int] = set()
     imported: set[int] = set()
-    for node in ast.walk(parse(file)) if nodes is None else nodes:
+    for node in walk(parse(file)) if nodes is None else nodes:
         if isinstance(node, ast.Import | ast.ImportFrom):
             imported.update(range(node.lineno, (node.end_lineno or node.lineno) + 1))
         elif isinstance(node, ast.Expr) and isinstance(getattr(node.value, "value", None), str):
@@ -116,7 +127,7 @@ def untyped(file: Path) -> Iterator[str]:
 
 def misshapen(file: Path) -> Iterator[str]:
     """Files, functions, argument lists and classes that have outgrown the limits above."""
-    nodes = list(ast.walk(parse(file)))
+    nodes = list(walk(parse(file)))
     yield from outgrown(nodes, lines_of(file, nodes))
 
 

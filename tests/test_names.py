@@ -92,7 +92,7 @@ def room_of(file: Path, root: Path) -> str:
 
 def assigned(tree: ast.AST) -> Iterator[tuple[int, str]]:
     """Names of variables, arguments, functions and classes of a module, without leading underscores."""
-    for node in ast.walk(tree):
+    for node in source.walk(tree):
         match node:
             case ast.Name(id=name, ctx=ast.Store()) | ast.arg(arg=name) | ast.MatchAs(name=str(name)):
                 pass
@@ -140,7 +140,7 @@ def docstrings(tree: ast.Module) -> set[ast.AST]:
     """Docstrings, also those below a constant; they may show machine input."""
     return {
         node.value
-        for node in ast.walk(tree)
+        for node in source.walk(tree)
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
     }
 
@@ -156,11 +156,11 @@ def is_unit(text: str) -> bool:
 
 def units_in_ascii(tree: ast.Module) -> list[str]:
     """Texts with a unit in ASCII, but for those that are a unit and nothing else, which the machine reads."""
-    pieces = {piece for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for piece in node.values}
+    pieces = {piece for node in source.walk(tree) if isinstance(node, ast.JoinedStr) for piece in node.values}
     left_out = docstrings(tree)
     return [
         f"line {node.lineno}: {node.value.strip()!r}"
-        for node in ast.walk(tree)
+        for node in source.walk(tree)
         if isinstance(node, ast.Constant)
         and isinstance(node.value, str)
         and node not in left_out

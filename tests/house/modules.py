@@ -63,7 +63,7 @@ class Module:
     @cached_property
     def nodes(self) -> dict[type[ast.AST], list[Any]]:
         found: dict[type[ast.AST], list[Any]] = {}
-        for node in ast.walk(self.tree):
+        for node in source.walk(self.tree):
             found.setdefault(type(node), []).append(node)
         return found
 

@@ -160,6 +160,7 @@ CASES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases(
     "two branches-0.3",
     "one-sided, part-0.3",

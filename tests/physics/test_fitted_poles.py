@@ -84,6 +84,7 @@ def test_fitted_poles_err_less_than_the_gain_of_the_cascade(fitted: FittedPoles)
     assert fitted.deciding == "selection"
 
 
+@pytest.mark.slow
 def test_the_error_printed_is_that_of_the_observer_that_is_written(
     fitted: FittedPoles, model: FlatModel, bench: RecordSet
 ) -> None:
@@ -106,6 +107,7 @@ def test_the_error_printed_is_that_of_the_observer_that_is_written(
         assert np.max(np.abs(slopes[:, k] - differences)) < 1e-5 * scale
 
 
+@pytest.mark.slow
 def test_the_margin_is_that_of_the_error_between_the_points_too(fitted: FittedPoles) -> None:
     ends = fitted.design.compact.angles[[0, -1]]
     angles = np.linspace(*ends, 20 * 25 + 1)

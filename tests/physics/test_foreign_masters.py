@@ -15,11 +15,9 @@ from nlsdesign.model.flat import FlatModel
 
 PYTHON = Path(sys.executable)
 QUICK = [
-    *[("fmpy", "plant", "2.0"), ("fmpy", "controller", "3.0"), ("casadi", "plant", "3.0")],
-    *[("ecospy", "plant", "3.0"), ("ecospy", "observer", "2.0")],
-    *[("libcosimpy", "plant", "2.0"), ("libcosimpy", "controller", "2.0")],
-    *[("fmuloader", "plant", "2.0"), ("fmuloader", "observer", "3.0")],
-]
+    ("fmpy", "plant", "2.0"), ("casadi", "plant", "3.0"), ("ecospy", "observer", "2.0"),
+    ("libcosimpy", "controller", "2.0"), ("fmuloader", "observer", "3.0"),
+]  # fmt: skip
 REST = [
     (master, name, version)
     for master in ("fmpy", "casadi", "ecospy", "libcosimpy", "fmuloader")

@@ -88,6 +88,7 @@ def test_angle_and_speed_follow(cascade: ObserverDesign, moving: Trace) -> None:
     assert np.max(np.abs(found["motor.angle.estimate"] - moving["motor.angle"])[late]) < 5e-5
 
 
+@pytest.mark.slow
 def test_the_minimal_form_does_not_depend_on_the_state_that_carries_it(
     model: FlatModel, moving: Trace
 ) -> None:

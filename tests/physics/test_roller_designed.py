@@ -139,6 +139,7 @@ def drawn(design: CamDesign, folder: Path) -> str:
     return (folder / "cam.dxf").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("signs")
 @pytest.mark.parametrize("which", ["hills", "signs"])
 def test_a_circle_rolled_over_the_drawn_edge_gives_way_and_torque(

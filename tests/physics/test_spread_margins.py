@@ -55,6 +55,7 @@ def reproduced(loop: ClosedLoop) -> SpreadMargins:
     return spread_margins(loop, GAIN, last=LAST, translate=quickest())
 
 
+@pytest.mark.slow
 def test_the_gain_of_the_studies_is_a_finding_with_the_gain_that_has_a_margin(
     reproduced: SpreadMargins,
 ) -> None:

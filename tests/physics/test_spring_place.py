@@ -239,6 +239,7 @@ def test_a_scan_finds_no_better_gear_ratio(joint: str, drive: MotorAndGear, plac
     assert math.log(ours.drive.gear_ratio) == pytest.approx(finer.x, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_limit_decides_the_gear_ratio() -> None:
     """The motor may turn only so fast: the ratio is then what the fastest motion leaves."""
     task = WALKING["hip"]

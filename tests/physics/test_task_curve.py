@@ -154,6 +154,7 @@ def test_a_cubic_spring_is_found_from_its_own_oscillation() -> None:
     assert curve.linear.heat > 20.0 * curve.best.heat, "a linear spring does not swing like this"
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("knee", "hip")
 @pytest.mark.parametrize("joint", WALKING)
 def test_the_motor_torque_moves_the_motor_as_claimed(joint: str) -> None:

@@ -114,6 +114,7 @@ def test_ranges_have_a_lower_tail() -> None:
     assert bounded < 0.7 * goal_in_newton_metres(ToleranceQuantile(rules=RULES, trims=()), target)
 
 
+@pytest.mark.long_cases("set-trimmed", "creep-trimmed")
 @pytest.mark.parametrize("trims", [None, ()], ids=["trimmed", "as built"])
 @pytest.mark.parametrize("takes", [{"share": 0.3}, {"time": 600.0}], ids=["set", "creep"])
 def test_what_time_takes_is_counted(takes: dict[str, float], trims: tuple[str, ...] | None) -> None:

@@ -13,6 +13,7 @@ __all__ = ["undrawn"]
 pytestmark = pytest.mark.usefixtures("undrawn")
 
 
+@pytest.mark.slow
 def test_the_study_keeps_its_claims(tmp_path: Path) -> None:
     results = runner.run_study("observer_over_angle", tmp_path, fast=True)
     assert runner.not_as_claimed(results, runner.claims("observer_over_angle")) == {}

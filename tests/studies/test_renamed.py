@@ -265,6 +265,7 @@ def test_fit(benches: Bench, tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.slow
 def test_diagnose_and_report(benches: Bench, tmp_path: Path) -> None:
     verdicts = [diagnose(*each, catalogue=CATALOGUE) for each in benches.both]
     assert [[effect.name for effect in verdict.effects] for verdict in verdicts] == [["coulomb_friction"]] * 2

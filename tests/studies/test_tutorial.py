@@ -46,6 +46,7 @@ def quick_words(line: str) -> tuple[list[str], bool]:
     return words + more, not more
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_machines")
 def test_the_commands_and_scripts_work_with_smaller_settings(
     run: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -65,6 +65,7 @@ def test_unknown_deck_names_the_nearest(run: Run) -> None:
     assert "did you mean 'austin2015_soft_spring'?" in err
 
 
+@pytest.mark.slow
 def test_infeasible_limits_are_named(run: Run, tmp_path: Path) -> None:
     words = ["--maximum", "5 N*m", "--angle", "53 deg"]
     words += ["--limit", 'MinimumRadiusOfCurvature = {radius = "30 mm"}']

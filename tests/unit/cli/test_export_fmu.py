@@ -66,6 +66,7 @@ def test_the_law_is_that_of_the_c_code(run: Run, tmp_path: Path, law: tuple[str,
     assert words in (tmp_path / "c" / "controller.h").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_what_is_asked_for_is_written_once_with_its_reference(run: Run, tmp_path: Path) -> None:
     asked = ("--what", "controller", "--what", "controller", "--reference", "--version", "2.0")
     status, out, err = run(*WORDS, "--out", "o", *asked)

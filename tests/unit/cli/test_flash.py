@@ -164,6 +164,7 @@ def test_a_table_within_size_and_error_is_taken(export: Run) -> None:
     assert "moves the torque by at most" in out
 
 
+@pytest.mark.slow
 def test_a_folder_in_the_place_of_a_file_stops_everything(export: Run, tmp_path: Path) -> None:
     (tmp_path / "q" / "observer.h").mkdir(parents=True)
     status, _, err = export("--out", "q")

@@ -170,6 +170,7 @@ def test_limits_that_are_reached_are_warned_of(run: Run) -> None:
     assert quiet["signals"]["motor.angle"]["rms"] == 0.0
 
 
+@pytest.mark.slow
 def test_a_supply_at_its_limit_is_warned_of_and_its_current_predicted(run: Run) -> None:
     """The speed bends sharply where the supply sets in; over a long span of the rate it is blurred."""
     assert run("deck", "new", "joint.toml", "--template", "geared-joint", "--yes")[0] == 0

@@ -93,6 +93,7 @@ def test_given_spreads_replace_declared_and_assumed_ones() -> None:
     assert not set(gone) & set(causes)
 
 
+@pytest.mark.slow
 def test_moduli_may_deviate_separately() -> None:
     model = flatten(declare(load_deck("austin2015_figure_consistent")))
     names = [cause.name for cause in spring_causes(model, None, SpreadRules(separate_moduli=True))]

@@ -93,6 +93,7 @@ def schema(folder: str, name: str) -> etree.XMLSchema:
     return etree.XMLSchema(etree.parse(str(SCHEMAS / folder / name)))
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("plant-2.0", "observer-2.0", "controller-2.0", "observer-3.0", "controller-3.0")
 @both
 @each_model

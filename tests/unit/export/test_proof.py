@@ -117,6 +117,7 @@ def test_what_a_comparison_implies_stands_behind_it() -> None:
     assert "admit !\\is_NaN((double)a.very.long.name)" in with_numbers_admitted(wrapped)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("two_machines")
 def test_the_command_writes_the_library_and_says_what_a_proof_needs(
     run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

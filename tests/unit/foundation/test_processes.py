@@ -156,6 +156,7 @@ print("done")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("300")
 @pytest.mark.parametrize("times", ["100", "300"])
 def test_short_maps_end_where_the_process_handles_requests_to_end(times: str) -> None:

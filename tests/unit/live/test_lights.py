@@ -100,6 +100,7 @@ def test_what_breaks_and_what_nobody_knows_to_hold_is_told(design: CamDesign, qu
         assert words in found[1]
 
 
+@pytest.mark.slow
 def test_a_torque_that_sensors_do_not_show_is_told(design: CamDesign) -> None:
     blind = with_deck(design, f"quantum = {NUMBER}", "quantum = {value = 900.0")
     for changed, answer, words in (

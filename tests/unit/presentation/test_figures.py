@@ -112,6 +112,7 @@ def test_a_hostile_label_stays_text() -> None:
     assert evil in root.get("aria-label", "")
 
 
+@pytest.mark.slow
 def test_more_lines_than_colours_are_all_drawn_and_differ() -> None:
     estimates = {f"observer {i}": samples.torque() + 0.01 * i for i in range(12)}
     figure = figures.observer_error(samples.TIME, samples.torque(), estimates)

@@ -62,6 +62,7 @@ def agrees(table: SweepTable, row: int, found: Verdict) -> None:
         assert np.array_equal(answers[f"probability.{name}"], named.get(name, math.nan), equal_nan=True)
 
 
+@pytest.mark.slow
 def test_sets_of_records_are_points_and_a_set_that_cannot_be_judged_says_why(
     sets: tuple[Assembly, Path],
 ) -> None:

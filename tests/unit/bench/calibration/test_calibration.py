@@ -178,6 +178,7 @@ def test_everything_but_the_drive_is_clamped() -> None:
 # --- estimates ------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_hung_weight_tells_constant_stiffness_and_friction(weighed: Estimate) -> None:
     off = misses(weighed, truth(TRUE))
     assert {"motor.torque_constant", "spring.stiffness", "dry_friction.sliding_effort"} <= set(off)
@@ -243,6 +244,7 @@ def test_a_weight_in_another_unit_or_sign_is_refused(tmp_path: Path, factor: flo
         estimate(deck(LINEAR), [read("hung_weight", folder, deck(LINEAR))])
 
 
+@pytest.mark.slow
 def test_what_the_deck_lacks_widens_all(tmp_path: Path, weighed: Estimate) -> None:
     folder = recorded("hung_weight", tmp_path, replace(TRUE, breakaway=0.012))
     found = estimate(deck(LINEAR), [read("hung_weight", folder, deck(LINEAR))])

@@ -79,6 +79,7 @@ def test_a_span_of_rates_leaves_what_a_damped_mode_does(
     assert filters["axis_1"].span > 0.15, "behind the noise of the current nothing of it is seen"
 
 
+@pytest.mark.slow
 def test_a_span_of_rates_leaves_what_a_damping_does_that_nobody_declared(tmp_path: Path) -> None:
     """A span of a third of a period took a hundredth of the rate, and 2.4 times the noise was left."""
     write_kind_case(tmp_path, "elastic_joint", ("spring_damping",), 1.0, 1286)

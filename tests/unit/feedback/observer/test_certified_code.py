@@ -53,6 +53,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_forged_c_with_a_hash_written_anew_fails(run: Run, tmp_path: Path, written: Path) -> None:
     """The forger changes a digit of the table, its hash and the checksum; only writing anew tells."""
     shutil.copytree(written, tmp_path, dirs_exist_ok=True)
