@@ -186,8 +186,8 @@ class Change:
         """Whether whole records are predicted better, where each is judged by the numbers of the others.
 
         Nothing is asked where only declared numbers are open. A record may depend so sharply on the numbers
-        that those of the others never predict it. Then the numbers of all records are judged, at what they cost
-        the others; that gain must not rest on the record that gains most, of which the others need know nothing.
+        that those of the others never predict it. Then the numbers of all records are judged, at what they
+        cost the others; that gain must not rest on the record that gains most, which the others need not know.
         """
         if not any(one.open for name, one in self.before.items() if name != DECLARED):
             return True

@@ -11,9 +11,9 @@ By pieces hypotheses are compared. Leaving whole records out asks more: of six m
 not identify what the sixth shows, so it would choose the models that leave that out. But an effect that does
 not predict whole records at all describes the records it was fitted to and nothing else. Where a record
 depends sharply on the numbers, such as one that rings in a resonance, those of the others never predict it,
-right as they are. Whole records are therefore judged in a second way too: with the numbers of all records, at
-the price of the squares that these cost the others. That is the least of both together, so what the numbers of
-the others leave open is no objection, and what they contradict is.
+right as they are. Whole records are therefore judged in a second way too: with the numbers of all records,
+at the price of the squares that these cost the others. That is the least of both together, so what the
+numbers of the others leave open is no objection, and what they contradict is.
 """
 
 from __future__ import annotations
@@ -144,7 +144,8 @@ def _predicted(
         inside = sum(float(r @ r) for _, r in own)
         for place, piece in enumerate(pieces):
             mask = piece.fold == fold
-            in_common[place] += price * float(piece.residual[mask] @ piece.residual[mask]) / max(inside, 1e-300)
+            squares = float(piece.residual[mask] @ piece.residual[mask])
+            in_common[place] += price * squares / max(inside, 1e-300)
             if mask.any():
                 linear: Array = piece.residual + piece.slope @ (moved - x)
                 predicted[place][mask] = linear[mask]
