@@ -187,7 +187,7 @@ class Change:
 
         Nothing is asked where only declared numbers are open. A record may depend so sharply on the numbers
         that those of the others never predict it. Then the numbers of all records are judged, at what they
-        cost the others; that gain must not rest on the record that gains most, which the others need not know.
+        cost the others; that gain must not rest on the record that gains most: the others need not know it.
         """
         if not any(one.open for name, one in self.before.items() if name != DECLARED):
             return True
