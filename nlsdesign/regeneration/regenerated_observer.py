@@ -177,7 +177,9 @@ def with_numbers(declared: FlatModel, values: Mapping[str, float]) -> FlatModel:
     for name, value in values.items():
         parts = name.split(".")
         shorter = [".".join(parts[:k] + parts[k + 1 :]) for k in range(1, len(parts) - 1)]
-        numbers |= {n: value for n in (name, *shorter) if n in declared.values and (n == name or n not in values)}
+        numbers |= {
+            n: value for n in (name, *shorter) if n in declared.values and (n == name or n not in values)
+        }
     return declared.with_values(numbers)
 
 
@@ -383,7 +385,7 @@ def regenerated_observer(
     """Design the observer again, and compare it with the one from the declared model."""
     progress("designing the observer of the better model")
     try:
-        watched, after, instead = _watched(declared, better, choice)
+        watched, after, instead = watched_model(declared, better, choice)
     except NlsError as error:
         return Regeneration(better, None, (f"no observer can be designed for the better model: {error}",))
     spring = series_spring(watched, choice.spring)
@@ -392,7 +394,9 @@ def regenerated_observer(
         before = _designed(declared, choice)
         seen = {r.name: WatchedRecord.of(watched, spring, r, choice) for r in records.records}
     except NlsError as error:
-        return Regeneration(better, after.model, (*instead, f"the observers are not compared: {error}"), **known)
+        return Regeneration(
+            better, after.model, (*instead, f"the observers are not compared: {error}"), **known
+        )
     runs = [seen[r.name] for r in records.of("held_out") or records.records]
     deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
     progress("designing the observers that learn")
@@ -423,7 +427,7 @@ def regenerated_observer(
     )
 
 
-def _watched(
+def watched_model(
     declared: FlatModel, better: FlatModel, choice: ObserverChoice
 ) -> tuple[FlatModel, ObserverDesign, tuple[str, ...]]:
     """Return the model whose observer stands for the better one, that observer, and why it is not its own."""
