@@ -51,7 +51,7 @@ from ..model.roles import measured_motion, series_spring
 from ..model.transform import with_outputs
 from ..simulation import Sine, declared_prior
 from .readiness import usual_last
-from .watched_records import ObserverChoice, WatchedRecord
+from .watched_records import STAND_IN, ObserverChoice, WatchedRecord, with_numbers
 
 SHARES = (0.2, 0.6)
 """Amplitudes of the sines over the largest torque that the declared drive can hold, up to the usual angle."""
@@ -162,25 +162,6 @@ def regenerated_controller(
         kept = "the controller stays that of the declared model, which follows better"
     added = tuple(sorted(set(after.values) - set(before.values)))
     return RegeneratedController(before if kept else after, sines, added, margins, kept)
-
-
-STAND_IN = "that of the declared model with the numbers of the better one"
-
-
-def with_numbers(declared: FlatModel, values: Mapping[str, float]) -> FlatModel:
-    """Return a model with those numbers of another that it has, there perhaps with one more part in the path.
-
-    An effect that rubs inside a spring stands around what the spring was: ``spring.cam`` becomes
-    ``spring.driven.cam``.
-    """
-    numbers = {}
-    for name, value in values.items():
-        parts = name.split(".")
-        shorter = [".".join(parts[:k] + parts[k + 1 :]) for k in range(1, len(parts) - 1)]
-        numbers |= {
-            n: value for n in (name, *shorter) if n in declared.values and (n == name or n not in values)
-        }
-    return declared.with_values(numbers)
 
 
 def usual_controller(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
@@ -394,9 +375,8 @@ def regenerated_observer(
         before = _designed(declared, choice)
         seen = {r.name: WatchedRecord.of(watched, spring, r, choice) for r in records.records}
     except NlsError as error:
-        return Regeneration(
-            better, after.model, (*instead, f"the observers are not compared: {error}"), **known
-        )
+        reasons = (*instead, f"the observers are not compared: {error}")
+        return Regeneration(better, after.model, reasons, **known)
     runs = [seen[r.name] for r in records.of("held_out") or records.records]
     deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
     progress("designing the observers that learn")
