@@ -111,7 +111,7 @@ def with_numbers(declared: FlatModel, values: Mapping[str, float]) -> FlatModel:
     An effect that rubs inside a spring stands around what the spring was: ``spring.cam`` becomes
     ``spring.driven.cam``.
     """
-    numbers = {}
+    numbers: dict[str, float] = {}
     for name, value in values.items():
         parts = name.split(".")
         shorter = [".".join(parts[:k] + parts[k + 1 :]) for k in range(1, len(parts) - 1)]
