@@ -16,7 +16,7 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -24,7 +24,8 @@ import numpy as np
 
 from models.test_rig import test_rig_deck
 from nlsdesign.bench.discrepancy import ALL, diagnose
-from nlsdesign.bench.identification import load_records
+from nlsdesign.bench.identification import RecordSet, load_records
+from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.components import Assembly
 from nlsdesign.export.c.guarded_step import GuardedModel
 from nlsdesign.feedback.observer import CascadeGain, design_observer
@@ -32,6 +33,7 @@ from nlsdesign.foundation.errors import NlsError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.regeneration import regenerate
 from nlsdesign.regeneration.regenerated_observer import usual_controller
+from nlsdesign.regeneration.watched_records import with_numbers
 from tests.rig import ACTUATORS, Actuator, Hidden, make_records, truth, write_set
 from tests.rig.bench import Servo, simulate
 from tests.rig.commands import STEP, Command
@@ -77,13 +79,6 @@ def sizes(hidden: Hidden) -> dict[str, dict[str, float]]:
 
 def told(declared: Assembly, effect: str, built: Actuator, hidden: Hidden) -> Assembly:
     """Return the declared deck with the true numbers of drive and rubber, and the effect at its true size."""
-    wanted, last = sizes(hidden)[effect], {}
-    machine = declared
-    for candidate in (c for e in ALL if e.__name__ == effect for c in e(declared)):
-        last = {unknown.name.rpartition(".")[2]: unknown.name for unknown in candidate.unknowns}
-        if set(wanted) == set(last):
-            machine = candidate.assembly
-            break
     drive, rubber = built.drivetrain, built.rubber
     relaxing = "spring.cable.rubber.relaxing"
     numbers = {
@@ -92,7 +87,12 @@ def told(declared: Assembly, effect: str, built: Actuator, hidden: Hidden) -> As
         f"{relaxing}.dashpot.viscosity": rubber.eta,
     }  # fmt: skip
     numbers |= {f"spring.cable.rubber.stiff.modulus[{i}]": k for i, k in enumerate(rubber.k_star, start=1)}
-    return machine.with_values(numbers | {last[name]: value for name, value in wanted.items()})
+    machine, wanted = declared.with_values(numbers), sizes(hidden)[effect]
+    for candidate in (c for e in ALL if e.__name__ == effect for c in e(machine)):
+        names = {unknown.name.rpartition(".")[2]: unknown.name for unknown in candidate.unknowns}
+        if set(wanted) == set(names):
+            return candidate.assembly.with_values({names[last]: value for last, value in wanted.items()})
+    return machine
 
 
 def wanted_torque(actuator: Actuator) -> Callable[[float], float]:
@@ -132,27 +132,44 @@ def torque_error(
 def judged(actuator: str, effect: str, seed: int) -> Mapping[str, object]:
     """Return what the diagnosis named, and the torque errors under the three decks, in mN·m."""
     made = ACTUATORS[actuator]
-    effects = {} if effect == "none" else {effect: 1.0}
     with TemporaryDirectory() as folder:
-        write_set(Path(folder), made, make_records(made, effects, seed))
+        write_set(Path(folder), made, make_records(made, hidden_of(effect), seed))
         declared = test_rig_deck(Path(folder) / "rig.toml", Path(folder) / "cam.csv")
-        plant = flatten(declared)
-        records = load_records(Path(folder), plant)
-    machine = truth(made, effects, seed)
+        records = load_records(Path(folder), flatten(declared))
     verdict = diagnose(declared, records)
-    result = regenerate(plant, flatten(verdict.actuator), records, fits=verdict.fits)
-    row: dict[str, object] = {"named": [e.name for e in verdict.effects], "reasons": list(result.reasons)}
-    before = design_observer(plant, gain=CascadeGain()), usual_controller(plant, 1e-3)[0]
-    row["before"] = 1e3 * torque_error(machine, made, *before)
+    named = [e.name for e in verdict.effects]
+    return {"named": named} | judged_under(
+        made, effect, seed, declared=declared, records=records, better=verdict.actuator, fits=verdict.fits
+    )
+
+
+def hidden_of(effect: str) -> dict[str, float]:
+    """Return the strength of an effect by name."""
+    return {} if effect == "none" else {effect: 1.0}
+
+
+def judged_under(
+    made: Actuator, effect: str, seed: int, *,
+    declared: Assembly, records: RecordSet, better: Assembly, fits: Sequence[Fit],
+) -> dict[str, object]:  # fmt: skip
+    """Return the torque errors of a machine under three decks, in mN·m, and what was said of the second."""
+    machine, plant = truth(made, hidden_of(effect), seed), flatten(declared)
+    result = regenerate(plant, flatten(better), records, fits=fits)
+    row: dict[str, object] = {"said": [*result.words(), *result.reasons]}
+
+    def error(observer: FlatModel, controller: FlatModel) -> float:
+        return 1e3 * torque_error(machine, made, observer, controller)
+
+    row["before"] = error(design_observer(plant, gain=CascadeGain()), usual_controller(plant, 1e-3)[0])
     if result.controller is not None and result.observer is not None:
-        row["after"] = 1e3 * torque_error(machine, made, result.observer, result.controller.controller)
+        row["after"] = error(result.observer, result.controller.controller)
         row["kept"] = result.controller.kept
+    true = flatten(told(declared, effect, *machine))
     try:
-        true = flatten(told(declared, effect, *machine))
-        best = design_observer(true, gain=CascadeGain()), usual_controller(true, 1e-3)[0]
-        row["told"] = 1e3 * torque_error(machine, made, *best)
-    except NlsError as error:
-        row["told_reason"] = str(error)
+        observer = design_observer(true, gain=CascadeGain())
+    except NlsError:  # as the package does
+        observer = design_observer(with_numbers(plant, true.values), gain=CascadeGain())
+    row["told"] = error(observer, usual_controller(true, 1e-3)[0])
     return row
 
 
@@ -174,7 +191,7 @@ def main() -> int:
                 rows[name] = judged(actuator, effect, given.seed)
                 given.out.parent.mkdir(parents=True, exist_ok=True)
                 given.out.write_text(json.dumps(rows, indent=1), "utf-8")
-            print(name, {k: v for k, v in rows[name].items() if k != "reasons"}, flush=True)
+            print(name, {k: v for k, v in rows[name].items() if k != "said"}, flush=True)
     return 0
 
 

@@ -102,6 +102,25 @@ class WatchedRecord:
         return float(np.sqrt(np.mean((estimate - self.torque)[self.skipped :] ** 2)))
 
 
+STAND_IN = "that of the declared model with the numbers of the better one"
+
+
+def with_numbers(declared: FlatModel, values: Mapping[str, float]) -> FlatModel:
+    """Return a model with those numbers of another that it has, there perhaps with one more part in the path.
+
+    An effect that rubs inside a spring stands around what the spring was: ``spring.cam`` becomes
+    ``spring.driven.cam``.
+    """
+    numbers: dict[str, float] = {}
+    for name, value in values.items():
+        parts = name.split(".")
+        shorter = [".".join(parts[:k] + parts[k + 1 :]) for k in range(1, len(parts) - 1)]
+        numbers |= {
+            n: value for n in (name, *shorter) if n in declared.values and (n == name or n not in values)
+        }
+    return declared.with_values(numbers)
+
+
 _TORQUE = "torque behind the readings"
 
 

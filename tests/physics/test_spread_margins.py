@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from nlsdesign.components import declare, with_moved_load
+from nlsdesign.components import DriveDelay, declare, with_moved_load
 from nlsdesign.export import quickest
 from nlsdesign.feedback.control import (
     REPRODUCED_GAINS,
@@ -34,6 +34,7 @@ from nlsdesign.feedback.control.evaluation.spread_margins import (
 )
 from nlsdesign.feedback.control.evaluation.whole_evaluation import with_margin
 from nlsdesign.foundation.deck import load_deck
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 
 GAIN, LAST = "controller.proportional", np.radians(50.0)
@@ -174,3 +175,26 @@ def test_a_gain_that_nobody_gave_is_lowered_to_one_with_a_margin_and_a_given_one
     assert "6 dB, 30° are asked for: 14" in given
     assert taken == f"{given}, and is taken"
     assert lowered.values[GAIN] == pytest.approx(14.2, abs=0.3)
+
+
+def test_behind_a_delay_both_loops_are_slowed_until_there_is_a_margin(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """8 ms are 130° at the 45 Hz of the velocity loop, so no gain outside it helps; a run shows both."""
+    monkeypatch.setattr(over_the_spread, "DRAWS", 0)
+    monkeypatch.setattr(over_the_spread, "_TRIED", 1)  # of gains of the outer law, none of which helps
+    assembly = declare(load_deck("austin2015_figure_consistent"))
+    chain = (("delay", DriveDelay(delay=Quantity(8e-3, "s", "by hand"))),)
+    plant = flatten(assembly.with_part("motor", replace(assembly["motor"], chain=chain)))
+    law = ScheduledTorque()
+    controller, words = with_margin(
+        plant, "controller.bandwidth", given=False, last=LAST, sample_time=1e-3, law=law
+    )
+    assert "none below was found; with a velocity loop of" in words
+    slowed, _ = cascade_loops(plant, plant, delay=1, sample_time=1e-3, law=law)
+    errors = []
+    for each in (slowed, replace(slowed, controller=controller)):
+        run = each.run(1.5, inputs={each.desired: 1.0})
+        errors.append(float(np.max(np.abs(run[each.torque] - 1.0)[run.time > 1.2])))
+    assert errors[0] > 1.0
+    assert errors[1] < 0.05

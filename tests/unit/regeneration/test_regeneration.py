@@ -14,9 +14,19 @@ from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.least_squares import Fit
 from nlsdesign.bench.identification.parameters import declared_parameter
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.components import ROTATION, Assembly, Encoder, Fixed, GearedMotor, Inertia, Spring, tie
+from nlsdesign.components import (
+    ROTATION,
+    Assembly,
+    Encoder,
+    Fixed,
+    GearedMotor,
+    Inertia,
+    LoadFriction,
+    Spring,
+    tie,
+)
 from nlsdesign.components.assembly.named_parts import assembly
-from nlsdesign.feedback.control import ClosedLoop, torque_controller
+from nlsdesign.feedback.control import ClosedLoop, encoder_loop, torque_controller
 from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.foundation.quantity import Quantity
@@ -56,6 +66,14 @@ def machine(stiffness: float) -> Assembly:
         spring=tie(Spring(stiffness=number, domain=ROTATION), "motor", "load"),
         encoder=Encoder(of="motor.angle", quantum=Quantity(1e-5, "rad", source)),
     )
+
+
+def rubbing(stiffness: float) -> FlatModel:
+    """The machine with friction in the tie of its spring, in proportion to the load."""
+    plain = machine(stiffness)
+    inside = (("driven", plain.element("spring")),)
+    law = LoadFriction(members=inside, ratio=Quantity(0.3, "1", "by hand"))
+    return flatten(plain.with_part("spring", law.smooth(0.02)))
 
 
 def bench(*signals: str) -> RecordSet:
@@ -242,7 +260,32 @@ def test_a_controller_without_an_observer_of_its_model_says_whose_is_in_the_loop
     monkeypatch.setattr(regenerated_observer, "usual_controller", usual)
     monkeypatch.setattr(regenerated_observer, "sine_error", lambda *_: 1.0)
     chosen = regenerated_observer.regenerated_controller(declared, better, 2e-3)
-    assert chosen.words()[1].endswith("the observer in the loop is that of the declared model for both.")
+    assert chosen.words()[1].endswith(f"the observer in the loop after is {regenerated_observer.STAND_IN}.")
+
+
+@pytest.mark.usefixtures("observer_alone")
+def test_where_a_law_has_no_observer_the_declared_one_takes_its_numbers() -> None:
+    """Friction that grows with the load is no function of the angle; the stiffness behind it still is."""
+    found = regenerate(flatten(machine(DECLARED)), rubbing(TRUE), bench(*ALL), choice=CHOICE)
+    before, after = found.nominal
+    assert before == pytest.approx((TRUE - DECLARED) * float(np.sqrt(np.mean(ANGLE**2))), rel=0.05)
+    assert after < 0.02 * before
+    assert found.observer is not None
+    assert found.reasons[0].startswith("no observer can be designed for the better model: ")
+    assert found.reasons[0].endswith(f"in its place stands {regenerated_observer.STAND_IN}")
+
+
+def test_friction_that_grows_with_the_load_inside_a_spring_is_compensated() -> None:
+    """A third of the load rubs: the error falls by more than a fifth where the controller reckons with it."""
+    plant, declared = rubbing(TRUE), flatten(machine(TRUE))
+    observer = design_observer(declared, gain=CascadeGain())
+    unknown, known = (
+        regenerated_observer.sine_error(
+            encoder_loop(plant, observer=observer, controller=torque_controller(model)), 1.0, 2.0, 0.0
+        )
+        for model in (declared, plant)
+    )
+    assert known < 0.8 * unknown
 
 
 def test_a_machine_without_a_spring_says_why_it_has_no_observer() -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +24,9 @@ from ....simulation.buffered import Translate, as_it_is
 from ...observer import CascadeGain, design_observer
 from ..closed_loop import ClosedLoop, encoder_loop
 from ..laws.known_drive import largest_torque, only_side
+from ..laws.outer_laws import ScheduledTorque
 from ..laws.torque_loop import torque_controller
+from ..laws.velocity_loop import VelocityLoop
 from .loop_verdict import LoopVerdict
 from .margins import (
     CoupledStability,
@@ -298,13 +300,18 @@ def cascade_loops(
     return first, second
 
 
+SLOWER = (0.5, 0.25, 0.125)
+"""Bandwidths of both loops that are tried where no gain of the outer one is low enough, as shares."""
+
+
 def with_margin(
     plant: FlatModel, gain: str, *, last: float, given: bool, sample_time: float, **law: Any
 ) -> tuple[FlatModel, str]:
     """Return the controller of a plant and a sentence on its margins.
 
-    The gain is lowered where it was not ``given`` and lacks them; ``last`` is the angle to which they are
-    taken, ``law`` as for :func:`~nlsdesign.feedback.control.torque_controller`.
+    The gain is lowered where it was not ``given`` and lacks them, and where none is low enough, as behind a
+    delay, the velocity loop with it. ``last`` is the angle to which they are taken, ``law`` as for
+    :func:`~nlsdesign.feedback.control.torque_controller`.
     """
     controller = torque_controller(plant, sample_time=sample_time, **law)
     try:
@@ -315,9 +322,22 @@ def with_margin(
     if margins.kept:
         return controller, margins.margins()
     (lacks,) = margins.findings()
-    if given or math.isnan(margins.enough):
+    if math.isfinite(margins.enough) and not given:
+        return controller.with_values({gain: margins.enough}), f"{lacks}, and is taken"
+    outer, around = law.get("law"), law.get("velocity") or VelocityLoop()
+    if given or around.bandwidth is not None or not isinstance(outer, ScheduledTorque):
         return controller, lacks
-    return controller.with_values({gain: margins.enough}), f"{lacks}, and is taken"
+    for share in SLOWER:
+        inner = replace(around, bandwidth=share * around.closes_at(sample_time))
+        slow = replace(outer, bandwidth=share * outer.closes_at(sample_time))
+        loop, _ = cascade_loops(
+            plant, plant, delay=1, sample_time=sample_time, **law | {"law": slow, "velocity": inner}
+        )
+        margins = margins_alone(loop, gain, last=last)
+        if margins.kept:
+            closes = f"with a velocity loop of {inner.closes_at(sample_time):.3g} Hz"
+            return loop.controller, f"{lacks}; {closes} {margins.margins()}, and is taken"
+    return controller, lacks
 
 
 def json_number(value: float) -> float | str | None:

@@ -189,11 +189,12 @@ def known_load(
     spring.
     """
     plant, spring, body = drive.plant, series_spring(drive.plant), drive.body
-    opened = cut(plant, [spring.effort, f"{body.name}.drive_torque", *end_stops(drive)])
+    carried = carried_torque(drive)
+    opened = cut(plant, [carried, f"{body.name}.drive_torque", *end_stops(drive)])
     s, (before, declared) = opened.symbols(), drive.named
     known = named(opened, s)
     given = ca.vertcat(
-        known[body.motion], known[body.rate], s.input[[v.name for v in opened.inputs].index(spring.effort)]
+        known[body.motion], known[body.rate], s.input[[v.name for v in opened.inputs].index(carried)]
     )
     acceleration = s.derivative[[v.name for v in opened.states].index(body.rate)]
     resisting = -_at_start(opened, s, known[body.inertia or ""] * acceleration, given)
@@ -218,6 +219,34 @@ def known_load(
         return (at(size) * (1 + share) + at(-size) * (1 - share)) / 2
 
     return smooth
+
+
+def carried_torque(drive: KnownDrive) -> str:
+    """Return the signal of the spring's torque that can be estimated: without what its load rubs in its tie.
+
+    Such friction, T = T_in·(1 + µ·sgn ω), stands around what the spring was; neither a sensor in the spring
+    nor an observer over its angle has it.
+    """
+    plant, spring, known = drive.plant, series_spring(drive.plant), drive.named[0]
+    path, _, ending = spring.effort.rpartition(".")
+    for name in (v.name for v in plant.signals):
+        part = name.removeprefix(f"{path}.").removesuffix(f".{ending}")
+        if name != f"{path}.{part}.{ending}" or "." in part or known[name].is_leaf():
+            continue
+        opened = cut(plant, [name])
+        s = opened.symbols()
+        inside, signals = s.input[[v.name for v in opened.inputs].index(name)], named(opened, s)
+        given = ca.vertcat(inside, signals[drive.body.rate])
+        beyond = ca.Function(
+            "beyond", [given, s.parameter], [_at_start(opened, s, signals[spring.effort] - inside, given)]
+        )
+        unloaded, still, rubbing = (
+            abs(float(beyond(ca.DM(at), plant.start(plant.parameters)))) > _NOTHING
+            for at in ((0.0, SLOW), (1.0, 0.0), (1.0, SLOW))
+        )
+        if rubbing and not (unloaded or still):
+            return name
+    return spring.effort
 
 
 def _at_start(model: FlatModel, s: Symbols, expression: Expression, free: Expression) -> Expression:
