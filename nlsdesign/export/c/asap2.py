@@ -42,29 +42,6 @@ def write_a2l(
 ) -> Path:
     """Write an A2L file: the numbers of a block as characteristics, what an instance holds as measurements.
 
-    Parameters
-    ----------
-    layout
-        Of the code.
-    path
-        File to write.
-    block
-        Name of the variable in the program that is the block to be calibrated, in memory that can be written.
-    instance
-        Name of the variable that is the instance of the code.
-    elf
-        Linked program with these two symbols, for their addresses; 0 stands for them without one.
-
-    Returns
-    -------
-    Path
-        That of the description.
-
-    Raises
-    ------
-    ExportError
-        If a name is no identifier, or the program cannot be read or lacks a symbol.
-
     Examples
     --------
     >>> write_a2l(source.layout, "joint.a2l", block="joint_block", elf="firmware.elf")  # doctest: +SKIP
