@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from .options import (
-    DECK_HELP,
     controller_of,
     deck_option,
     flash_options,
@@ -19,8 +18,10 @@ from .options import (
     law_options,
     machine_of,
     measured_option,
+    other_deck_option,
     real_option,
     sample_time_option,
+    smooth_option,
     spring_option,
 )
 from .output import examples, show_json, show_lines, show_table, show_written, warn
@@ -259,7 +260,7 @@ def export_controller(
 )
 @deck_option
 @out_file_option(None, "File to write, NAME.mo.", ending=".mo")
-@click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
+@smooth_option
 @click.option(
     "--output",
     "outputs",
@@ -292,7 +293,7 @@ def export_modelica_text(
     ),
 )
 @deck_option
-@click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
+@smooth_option
 @out_option("out/mujoco")
 @json_option
 def export_for_mujoco(deck_name: str, smooth: bool, out: Path, as_json: bool) -> None:
@@ -336,7 +337,7 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
     ),
 )
 @click.argument("folder", type=NamedPath(example="out/c"))
-@click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
+@other_deck_option
 @json_option
 def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
     """Say whether exported files belong together, and to a deck. C, Modelica, FMUs, decks in a folder.

@@ -30,6 +30,11 @@ measured_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 DECK_HELP = "Deck file, or the name of one that comes with the project."
 deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK", help=DECK_HELP)
+other_deck_option = click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
+deck_argument = click.argument("deck_name", metavar="DECK")
+smooth_option = click.option(
+    "--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft."
+)
 mapping_option = click.option(
     "--mapping", type=NamedPath(dir_okay=False), default=None, help="TOML that maps columns to signals."
 )
@@ -128,7 +133,7 @@ _LAW = click.option(
     help="Of the controller: speed by tangent stiffness; a PID with the gain that the spring allows; or the "
     "PID with which the studies reproduce the published loop, Kp 32, which has little margin.",
 )
-_BANDWIDTH = click.option(
+bandwidth_option = click.option(
     "--bandwidth",
     type=Number("Hz", above=0.0),
     default=None,
@@ -144,7 +149,7 @@ _VELOCITY_BANDWIDTH = click.option(
 
 def law_options(command: F) -> F:
     """Add the options that choose the law of a torque controller."""
-    return _LAW(_BANDWIDTH(_VELOCITY_BANDWIDTH(command)))
+    return _LAW(bandwidth_option(_VELOCITY_BANDWIDTH(command)))
 
 
 def controller_of(

@@ -25,6 +25,11 @@ def visible(text: str) -> str:
 
     Line ends and tabs stay; escapes, carriage returns and marks that turn the direction of writing do not.
 
+    Parameters
+    ----------
+    text
+        From a file or a command line.
+
     Examples
     --------
     >>> print(visible("red \x1b[31m"))
@@ -39,7 +44,15 @@ def _code(character: str) -> str:
 
 
 def nearest(name: str, valid: Iterable[str]) -> str | None:
-    """Return the valid name closest to ``name``, or ``None`` when nothing is close."""
+    """Return the valid name closest to ``name``, or ``None`` when nothing is close.
+
+    Parameters
+    ----------
+    name
+        The name as it was given.
+    valid
+        The names that would have been accepted.
+    """
     candidates = list(valid)
     if len(name) > _LONGEST_NAME:
         return None
@@ -85,7 +98,13 @@ class NlsError(Exception):
         super().__init__(text)
 
     def at(self, place: str) -> NlsError:
-        """Return the same error with the place in front of the thing."""
+        """Return the same error with the place in front of the thing.
+
+        Parameters
+        ----------
+        place
+            For instance ``"deck.toml:12:1: spring.rubber.area"``.
+        """
         return _rebuild(type(self), f"{place}: {self.thing}", self.rule, self.did_you_mean, self.next_step)
 
     def __reduce__(self) -> tuple[object, ...]:
@@ -94,6 +113,11 @@ class NlsError(Exception):
 
 def fit_for_message(text: str) -> str:
     r"""Return a text with control characters written out, and cut where it is very long.
+
+    Parameters
+    ----------
+    text
+        Holds names and numbers as somebody wrote them, who may not mean well.
 
     Examples
     --------
@@ -110,7 +134,13 @@ def _cut(text: str, length: int) -> str:
 
 
 def brief(value: object) -> str:
-    """Return a value as Python writes it, for a message; a long one is cut."""
+    """Return a value as Python writes it, for a message; a long one is cut.
+
+    Parameters
+    ----------
+    value
+        As read from a file.
+    """
     try:
         return _cut(repr(value), _LONGEST_RUN)
     except ValueError:  # a whole number of more digits than Python writes
@@ -168,7 +198,17 @@ class ExportError(NlsError):
 
 
 def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError:
-    """Return the error for a name that does not exist, with the nearest that does."""
+    """Return the error for a name that does not exist, with the nearest that does.
+
+    Parameters
+    ----------
+    kind
+        What was looked up, for instance ``"parameter"``.
+    name
+        The name as given.
+    valid
+        All names that exist.
+    """
     names = sorted(valid)
     shown = ", ".join(names[:12]) + (", ..." if len(names) > 12 else "")
     return UnknownNameError(
@@ -180,7 +220,17 @@ def unknown_name(kind: str, name: str, valid: Iterable[str]) -> UnknownNameError
 
 
 def missing_library(what: str, library: str, extra: str) -> MissingLibraryError:
-    """Return the error for a library that is not installed, with the command that installs it."""
+    """Return the error for a library that is not installed, with the command that installs it.
+
+    Parameters
+    ----------
+    what
+        Needs the library.
+    library
+        Name of the module.
+    extra
+        Extra of the package that brings it.
+    """
     return MissingLibraryError(
         what, f"needs {library}, which is not installed", next_step=f"pip install 'nlsdesign[{extra}]'"
     )
@@ -188,6 +238,11 @@ def missing_library(what: str, library: str, extra: str) -> MissingLibraryError:
 
 def typed_command(*words: object) -> str:
     """Return words as one line that can be copied into a shell.
+
+    Parameters
+    ----------
+    words
+        Of the command, each unquoted.
 
     Examples
     --------

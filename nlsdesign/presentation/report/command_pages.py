@@ -87,7 +87,7 @@ def write_analysis_report(
     ranking: SensorRanking | None,
     files: Sequence[Path] = (),
 ) -> Path:
-    """Write the report on an analysis over the angle: what the sensors do not show, poles, further sensors."""
+    """Write the report on an analysis over the angle: what sensors do not show, poles, further sensors."""
     stiffness = chart["stiffness.slow"]
     low, high = (three_digits(float(end)) for end in (np.min(stiffness), np.max(stiffness)))
     seen = "at every angle" if drops.detectable else "not everywhere"
