@@ -22,7 +22,7 @@ from ...foundation.errors import ExportError
 from ...foundation.locations import version
 from ...model.flat import FlatModel
 from ..files import write_all
-from .c_text import Real, comment, half_byte_sums, origin_lines, stamped
+from .c_text import Real, comment, half_byte_sums, identifier, origin_lines, stamped
 from .controller_code import export_c
 from .writer import CSource
 
@@ -163,8 +163,8 @@ class WatchSource:
     ----------
     plan
         What they compute.
-    real
-        The number type.
+    name, real
+        Prefix of all C names, and the number type.
     residuals
         The step that gives the residuals.
     header, source, selftest
@@ -172,6 +172,7 @@ class WatchSource:
     """
 
     plan: WatchPlan
+    name: str
     real: Real
     residuals: CSource
     header: Path
@@ -185,20 +186,23 @@ class WatchSource:
         return (*own, self.residuals.header, self.residuals.source, self.residuals.selftest)
 
 
-def export_watch(plan: WatchPlan, folder: str | Path, *, real: Real | str = Real.FLOAT) -> WatchSource:
+def export_watch(
+    plan: WatchPlan, folder: str | Path, *, real: Real | str = Real.FLOAT, name: str = "watch"
+) -> WatchSource:
     """Write the C of a monitor, with its self-test."""
-    number = Real.named(real)
+    number, prefix = Real.named(real), identifier(name)
     if plan.first_bit(len(plan.blocks)) > 32:
         raise ExportError(f"deck '{plan.model.name}'", "has more numbers to watch than a word has bits",
                           next_step="watch a part of it: a deck with fewer readings")  # fmt: skip
-    residuals = export_c(plan.model, folder, real=number, name="watch_residuals")
-    values = _values(plan, number, residuals) | {"name": "watch", "NAME": "WATCH"}
+    residuals = export_c(plan.model, folder, real=number, name=f"{prefix}_residuals")
+    values = _values(plan, number, residuals)
+    values |= {"name": prefix, "NAME": prefix.upper()}
     texts = {
-        Path(folder) / f"watch{ending}": residuals.writer.filled(template, values)
+        Path(folder) / f"{prefix}{ending}": residuals.writer.filled(template, values)
         for ending, template in ((".h", "watch.h"), (".c", "watch.c"), ("_selftest.c", "watch_selftest.c"))
     }
     write_all({path: stamped(text, plan.model) for path, text in texts.items()})
-    return WatchSource(plan, number, residuals, *texts)
+    return WatchSource(plan, prefix, number, residuals, *texts)
 
 
 def _block_rows(plan: WatchPlan, real: Real, residuals: CSource) -> tuple[list[str], list[str], list[str]]:
