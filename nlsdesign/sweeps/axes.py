@@ -340,8 +340,10 @@ def _box(
         column, values = subject.column(name, tuple(given), kind)
         # The points of a sample lie between whole numbers.
         if subject.is_whole(name):
-            raise ValueRangeError(f"range of {name}", "takes whole numbers only, a sample has others",
-                                  next_step="list them (Listed), or take a GridAxis in steps of one")  # fmt: skip
+            raise ValueRangeError(
+                f"range of {name}", "takes whole numbers only, a sample has others",
+                next_step="list them (Listed), or take a GridAxis in steps of one",
+            )  # fmt: skip
         ends.append(_ends(column, values))
         columns.append(column)
     low, high = np.array(ends).T
