@@ -14,6 +14,7 @@ from ..foundation.errors import MeasurementError, typed_command
 from ..foundation.quantity import typeset_unit, with_error
 from .export_block import block_option, written_block
 from .options import (
+    DECK_HELP,
     deck_option,
     export_option,
     hold_out_option,
@@ -22,7 +23,6 @@ from .options import (
     machine_of,
     mapping_option,
     measured_option,
-    other_deck_option,
     sample_time_option,
     spring_option,
     workers_option,
@@ -183,7 +183,7 @@ def _questions(deck: str | None, joints: Sequence[str], out: Path) -> list[tuple
         "nlsdesign diagnose --joint elbow=elbow.toml --joint knee=knee.toml --records logs",
     )
 )
-@other_deck_option
+@click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @click.option("--records", type=NamedPath(example="bench"), required=True, help="Folder of tables or logs.")
 @hold_out_option
 @mapping_option

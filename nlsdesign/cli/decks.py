@@ -21,7 +21,7 @@ from ..foundation.locations import bundled
 from ..foundation.quantity import sources, with_unit
 from ..foundation.text_files import write_text
 from .deck_new import force_option, new, refuse_to_replace, shown_command
-from .options import deck_argument, json_option, machine_of
+from .options import json_option, machine_of
 from .output import examples, line_width, next_command, show_json, show_table
 from .overwriting import out_file_option
 from .typed_values import NamedPath
@@ -64,7 +64,7 @@ def list_decks(as_json: bool) -> None:
 
 
 @deck.command("copy", epilog=examples("nlsdesign deck copy austin2015_figure_consistent leg.toml"))
-@deck_argument
+@click.argument("deck_name", metavar="DECK")
 @click.argument("out", metavar="OUT.TOML", type=NamedPath(dir_okay=False, example="leg.toml"))
 @force_option
 @json_option
@@ -86,7 +86,7 @@ def copy_deck(deck_name: str, out: Path, force: bool, as_json: bool) -> None:
         "nlsdesign deck check austin2015_figure_consistent", "nlsdesign deck check my.toml --json"
     )
 )
-@deck_argument
+@click.argument("deck_name", metavar="DECK")
 @json_option
 def check(deck_name: str, as_json: bool) -> None:
     """Name problems, likely slips and the commands it is ready for. Problems have line and column.
@@ -141,7 +141,7 @@ def _model_problems(assembly: Assembly) -> list[NlsError]:
 
 
 @deck.command(epilog=examples("nlsdesign deck show my.toml", "nlsdesign deck show my.toml --toml"))
-@deck_argument
+@click.argument("deck_name", metavar="DECK")
 @click.option("--toml", "as_toml", is_flag=True, help="Print the file as it stands, with its comments.")
 @json_option
 def show(deck_name: str, as_toml: bool, as_json: bool) -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import click
 
 from .options import (
+    DECK_HELP,
     controller_of,
     deck_option,
     flash_options,
@@ -18,10 +19,8 @@ from .options import (
     law_options,
     machine_of,
     measured_option,
-    other_deck_option,
     real_option,
     sample_time_option,
-    smooth_option,
     spring_option,
 )
 from .output import examples, show_json, show_lines, show_table, show_written, warn
@@ -260,7 +259,7 @@ def export_controller(
 )
 @deck_option
 @out_file_option(None, "File to write, NAME.mo.", ending=".mo")
-@smooth_option
+@click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
 @click.option(
     "--output",
     "outputs",
@@ -293,7 +292,7 @@ def export_modelica_text(
     ),
 )
 @deck_option
-@smooth_option
+@click.option("--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft.")
 @out_option("out/mujoco")
 @json_option
 def export_for_mujoco(deck_name: str, smooth: bool, out: Path, as_json: bool) -> None:
@@ -337,7 +336,7 @@ TOGETHER, APART, UNREADABLE = 0, 1, 2
     ),
 )
 @click.argument("folder", type=NamedPath(example="out/c"))
-@other_deck_option
+@click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
 @json_option
 def check_exports(folder: Path, deck_name: str | None, as_json: bool) -> int:
     """Say whether exported files belong together, and to a deck. C, Modelica, FMUs, decks in a folder.

@@ -30,11 +30,6 @@ measured_option = click.option(
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of a table.")
 DECK_HELP = "Deck file, or the name of one that comes with the project."
 deck_option = click.option("--deck", "deck_name", required=True, metavar="DECK", help=DECK_HELP)
-other_deck_option = click.option("--deck", "deck_name", default=None, metavar="DECK", help=DECK_HELP)
-deck_argument = click.argument("deck_name", metavar="DECK")
-smooth_option = click.option(
-    "--smooth", is_flag=True, help="Round what is sharp: dry friction creeps, stops are soft."
-)
 mapping_option = click.option(
     "--mapping", type=NamedPath(dir_okay=False), default=None, help="TOML that maps columns to signals."
 )
