@@ -11,7 +11,16 @@ import click
 from ..foundation.errors import ValueRangeError
 from ..foundation.quantity import typeset_unit
 from ..foundation.text_files import make_folder
-from .options import LAWS, deck_option, json_option, law_of, machine_of, measured_option, spring_option
+from .options import (
+    LAWS,
+    bandwidth_option,
+    deck_option,
+    json_option,
+    law_of,
+    machine_of,
+    measured_option,
+    spring_option,
+)
 from .output import examples, show_json, show_lines, show_table, warn
 from .overwriting import out_option
 from .typed_values import Number
@@ -228,8 +237,7 @@ _FILES = ("responses.csv", "responses.svg", "impedance.svg", "margins.svg", "cou
 @click.option("--law", type=click.Choice(list(LAWS)), default=None,
               help="As for export: speed by tangent stiffness, the default; a PID, the default where a gain "
               "of it is given; or reproduced, the PID of the studies.")  # fmt: skip
-@click.option("--bandwidth", type=Number("Hz", above=0.0), default=None,
-              help="Of the scheduled law; by default 12 Hz at 1 kHz.")  # fmt: skip
+@bandwidth_option
 @click.option("--proportional", type=Number("rad/s/N/m", above=0.0), default=None,
               help="Gain Kp of the torque loop; by default 12 Hz at 1 kHz where the spring is "
               "stiffest.")  # fmt: skip

@@ -128,7 +128,7 @@ _LAW = click.option(
     help="Of the controller: speed by tangent stiffness; a PID with the gain that the spring allows; or the "
     "PID with which the studies reproduce the published loop, Kp 32, which has little margin.",
 )
-_BANDWIDTH = click.option(
+bandwidth_option = click.option(
     "--bandwidth",
     type=Number("Hz", above=0.0),
     default=None,
@@ -144,7 +144,7 @@ _VELOCITY_BANDWIDTH = click.option(
 
 def law_options(command: F) -> F:
     """Add the options that choose the law of a torque controller."""
-    return _LAW(_BANDWIDTH(_VELOCITY_BANDWIDTH(command)))
+    return _LAW(bandwidth_option(_VELOCITY_BANDWIDTH(command)))
 
 
 def controller_of(

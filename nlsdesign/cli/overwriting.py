@@ -39,7 +39,7 @@ def out_option(default: str = "out", *, writes: Names = ()) -> Callable[[F], F]:
     kind = NamedPath(file_okay=False)
     text = "Folder for all files that are written."
     option = click.option(
-        "--out", type=kind, default=default, show_default=True, help=text, callback=_can_be_made
+        "--out", type=kind, default=default, show_default=True, help=text, callback=can_be_made
     )
 
     def below(given: Mapping[str, Any]) -> tuple[Path, list[Path]]:
@@ -142,13 +142,7 @@ def list_files(paths: Iterable[Path], folder: Path, *, as_json: bool, only_own: 
     sys.exit(1 if refused else 0)
 
 
-def folder_option(name: str, text: str) -> Callable[[F], F]:
-    """Return an option for a folder besides that of ``--out``; none by default."""
-    kind = NamedPath(file_okay=False, example="out/page")
-    return click.option(name, type=kind, default=None, metavar="FOLDER", help=text, callback=_can_be_made)
-
-
-def _can_be_made(_: click.Context, __: click.Parameter, folder: Path | None) -> Path | None:
+def can_be_made(_: click.Context, __: click.Parameter, folder: Path | None) -> Path | None:
     """Refuse, before any work, a folder that could not be written into; it is made with its first file."""
     if folder is None:
         return None
@@ -173,5 +167,5 @@ def _file_can_be_made(
         if ending and file.suffix.lower() != ending:
             step = f"name it {file.with_suffix(ending).name}"
             raise ValueRangeError(f"--out {file}", f"must end in {ending}", next_step=step)
-        _can_be_made(context, parameter, file.parent)
+        can_be_made(context, parameter, file.parent)
     return file

@@ -12,7 +12,7 @@ import click
 from ..foundation.errors import ExportError, NlsError, ValueRangeError
 from .options import json_option
 from .output import examples, next_command, show_json, show_table, show_written
-from .overwriting import folder_option, kept, out_option
+from .overwriting import can_be_made, kept, out_option
 from .typed_values import NamedPath, parse_number
 
 if TYPE_CHECKING:
@@ -46,9 +46,10 @@ _MOST_REASONS = 8
 @click.option("--mpi", is_flag=True, help="Ranks of MPI, started by mpiexec -n N python -m mpi4py.futures.")
 @click.option("--again", is_flag=True, help="Throw away what the folder holds of a sweep, compute anew.")
 @click.option("--retry-failed", is_flag=True, help="Compute points again that failed.")
-@folder_option(
-    "--report", "Write the page of the sweep into this folder at the end, as nlsdesign report does."
-)
+@click.option("--report", type=NamedPath(file_okay=False, example="out/page"), default=None,
+              metavar="FOLDER", callback=can_be_made,
+              help="Write the page of the sweep into this folder at the end, as nlsdesign report "
+              "does.")  # fmt: skip
 @click.option("--dry-run", is_flag=True, help="Only check the sweep, and say how many points stand already.")
 @json_option
 @click.pass_context

@@ -2,7 +2,8 @@
 
 from ..foundation.spread import Spread, UniformSpread
 from .curves.beside import SpringChoice, choose_spring, curve_beside
-from .curves.compliance import OddSpring, OneSidedSpring, TwoBranchSpring
+from .curves.compliance import OddSpring as OddSpring
+from .curves.compliance import OneSidedSpring, TwoBranchSpring
 from .curves.motor_and_gear import MotorAndGear, MotorCycle, motor_and_gear, motor_cycle
 from .curves.target import (
     ExponentialTorque,
@@ -39,21 +40,27 @@ from .drawing.making import carrying_note as carrying_note
 from .drawing.making import process_of as process_of
 from .drawing.rolling_cam import MachinedPair, MachinedRollerCam
 from .jobs.job_file import DRAWS as DRAWS
-from .jobs.job_file import DesignJob, TaskTarget, job_of, read_job
+from .jobs.job_file import DesignJob as DesignJob
+from .jobs.job_file import TaskTarget, read_job
 from .jobs.job_file import back_of as back_of
+from .jobs.job_file import job_of as job_of
 from .jobs.job_file import kinds as kinds
 from .jobs.job_file import read_entries as read_entries
 from .jobs.job_file import read_stock as read_stock
 from .jobs.job_file import read_target_entry as read_target_entry
 from .jobs.job_file import target_of_file as target_of_file
 from .jobs.written_design import (
-    DESIGN_FILES,
-    design_summary,
+    DESIGN_FILES as DESIGN_FILES,
+)
+from .jobs.written_design import (
+    design_summary as design_summary,
+)
+from .jobs.written_design import machined_cam as machined_cam
+from .jobs.written_design import (
     write_design,
     write_part,
     write_sides,
 )
-from .jobs.written_design import machined_cam as machined_cam
 from .optimisation.coil_limits import (
     GoodmanSafety,
     MaximumPressureAngle,
@@ -104,14 +111,14 @@ from .optimisation.stock import CoilStock, RubberStock, Stock
 from .optimisation.tolerance_goal import ToleranceQuantile, TrimRoom
 from .statics.contour import Contour, contour_from_lever_arm
 from .statics.declared_cam import contour_of_cam
-from .statics.equilibrium import elastic_law, equilibrium_torque
+from .statics.equilibrium import elastic_law as elastic_law
+from .statics.equilibrium import equilibrium_torque
 from .tolerance.causes import Cause, SpreadRules
 from .tolerance.monte_carlo import tolerance_analysis
 from .tolerance.tolerance_result import ToleranceResult
 from .tolerance.trimming import Trim
 
 __all__ = [
-    "DESIGN_FILES",
     "AnchorDistance",
     "AreaRange",
     "AtMost",
@@ -123,7 +130,6 @@ __all__ = [
     "ClampScrew",
     "CoilStock",
     "Contour",
-    "DesignJob",
     "DesignSettings",
     "EnergyLost",
     "ExponentialTorque",
@@ -159,7 +165,6 @@ __all__ = [
     "MotorAndGear",
     "MotorCycle",
     "NumberRange",
-    "OddSpring",
     "OneNumber",
     "OneSidedSpring",
     "OverTravel",
@@ -202,11 +207,8 @@ __all__ = [
     "curve_for_task",
     "design_cam",
     "design_sides",
-    "design_summary",
-    "elastic_law",
     "equilibrium_torque",
     "fingerprint",
-    "job_of",
     "motor_and_gear",
     "motor_cycle",
     "pareto",

@@ -116,18 +116,6 @@ def read_exports(folder: str | Path, *, reference: str = "") -> ExportedFolder:
 
     Files that this package did not write are passed over; links are not followed.
 
-    Parameters
-    ----------
-    folder
-        To look through.
-    reference
-        Digest of the deck that they are to belong to; empty if they are only to belong together.
-
-    Raises
-    ------
-    ExportError
-        If there is no such folder, it cannot be listed, or it holds no such file.
-
     Examples
     --------
     >>> read_exports("out/fmu").findings()  # doctest: +SKIP

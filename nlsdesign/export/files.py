@@ -67,6 +67,17 @@ def xml_text(root: ElementTree.Element) -> str:
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ElementTree.tostring(root, encoding="unicode") + "\n"
 
 
+def write_archive(path: Path, contents: Mapping[str, bytes]) -> None:
+    """Write an archive: the same bytes for the same content, without time stamps and local permissions."""
+    with draft(path) as file, zipfile.ZipFile(file, "w") as archive:
+        for name, content in contents.items():
+            entry = zipfile.ZipInfo(name, (1980, 1, 1, 0, 0, 0))
+            entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
+            # An FMU is compressed already.
+            entry.compress_type = zipfile.ZIP_STORED if name.endswith(".fmu") else zipfile.ZIP_DEFLATED
+            archive.writestr(entry, content)
+
+
 def write_all(texts: Mapping[Path, str]) -> None:
     """Write several files; none is replaced before all of them are written as temporary files."""
     if not texts:

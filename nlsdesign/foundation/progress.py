@@ -26,13 +26,7 @@ class Quiet:
 
 
 class Steps:
-    """Steps of a study: one line with the present step, and one with its duration at the end.
-
-    Parameters
-    ----------
-    stream
-        Where to print; standard error by default, so that standard output stays clean for ``--json``.
-    """
+    """Steps of a study: one line with the present step, and one with its duration at the end."""
 
     def __init__(self, stream: TextIO | None = None) -> None:
         self._stream = stream or sys.stderr
@@ -51,13 +45,7 @@ class Steps:
 
     @contextmanager
     def step(self, label: str) -> Iterator[None]:
-        """Run one step.
-
-        Parameters
-        ----------
-        label
-            Name of the step.
-        """
+        """Run one step."""
         begin = time.perf_counter()
         self._label = label
         self._show(label)

@@ -12,11 +12,12 @@ from .driven_run import signal_sizes as signal_sizes
 from .driven_run import with_prescribed_speeds as with_prescribed_speeds
 from .input_signals import Sine, sine
 from .integrate import simulate
-from .limits_reached import limits_reached
+from .limits_reached import limits_reached as limits_reached
 from .measure import measure
 from .prior import Prior, declared_prior
 from .simulated_batch import simulate_batch
-from .trace import RangeWarning, Trace, range_warnings
+from .trace import RangeWarning, Trace
+from .trace import range_warnings as range_warnings
 
 __all__ = [
     "Prior",
@@ -24,9 +25,7 @@ __all__ = [
     "Sine",
     "Trace",
     "declared_prior",
-    "limits_reached",
     "measure",
-    "range_warnings",
     "simulate",
     "simulate_batch",
     "sine",

@@ -224,21 +224,18 @@ class _Walk:
                 values[k] = value
             return [tuple(values)]
         if code in _MOVED:
-            return self._moved(code, node, given)
+            everything = tuple(k for values in given for k in values)
+            if code not in (ca.OP_VERTSPLIT, ca.OP_HORZSPLIT):
+                return [everything]
+            offsets = node.info()["offset"]
+            if offsets[-1] != len(everything):
+                raise NotByColumnsError("a matrix that is split")
+            return [everything[a:b] for a, b in pairwise(offsets)]
         size = max(len(values) for values in given)
         wide = [values * size if len(values) == 1 else values for values in given]
         if any(len(values) != size for values in wide):
             raise NotByColumnsError("operands of different sparsity")
         return [tuple(self._built.operation(code, each) for each in zip(*wide, strict=True))]
-
-    def _moved(self, code: int, node: ca.MX, given: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
-        everything = tuple(k for values in given for k in values)
-        if code not in (ca.OP_VERTSPLIT, ca.OP_HORZSPLIT):
-            return [everything]
-        offsets = node.info()["offset"]
-        if offsets[-1] != len(everything):
-            raise NotByColumnsError("a matrix that is split")
-        return [everything[a:b] for a, b in pairwise(offsets)]
 
     def _called(self, function: ca.Function, given: list[tuple[int, ...]]) -> list[tuple[int, ...]]:
         for i, values in enumerate(given):

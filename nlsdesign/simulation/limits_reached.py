@@ -38,15 +38,7 @@ class LimitReached(NamedTuple):
 
 
 def limits_reached(model: FlatModel, run: Trace) -> tuple[LimitReached, ...]:
-    """Return the declared limits that a run goes beyond.
-
-    Parameters
-    ----------
-    model
-        Continuous, with its declared numbers.
-    run
-        A simulation of it.
-    """
+    """Return the declared limits that a run goes beyond."""
     result = [*_drive(model, run), *_sensors(model, run), *_cams(model, run), *_strength(model, run)]
     return tuple(sorted(result, key=lambda each: each.time))
 

@@ -55,19 +55,7 @@ class RangeWarning(NamedTuple):
 def range_warnings(
     variables: Iterable[Variable], time: Array, signals: Mapping[str, Array], prefix: str = ""
 ) -> tuple[RangeWarning, ...]:
-    """Return a warning for each variable that leaves its stated range.
-
-    Parameters
-    ----------
-    variables
-        With ranges, for instance the signals and states of a flat model.
-    time
-        Shape (n,), in s.
-    signals
-        Arrays of shape (n,) by name; variables without an array are skipped.
-    prefix
-        Prefix of the names of the variables in ``signals``.
-    """
+    """Return a warning for each variable that leaves its stated range."""
     warnings = []
     for v in variables:
         values = signals.get(prefix + v.name)

@@ -7,8 +7,9 @@ from .axes import GridAxis, LatinHypercube, Listed, RandomDraws, SaltelliSample,
 from .preferences import Preference, Requirement
 from .questions import AngleQuestion, DesignQuestion, DiagnosisQuestion, LoopQuestion, SpreadQuestion
 from .run_sweep import SweepSettings as SweepSettings
-from .run_sweep import SweepTask, sweep
+from .run_sweep import SweepTask as SweepTask
 from .run_sweep import run_task as run_task
+from .run_sweep import sweep
 from .sweep_columns import SweepColumn
 from .sweep_columns import libraries as libraries
 from .sweep_file import read_sweep_file as read_sweep_file
@@ -34,7 +35,6 @@ __all__ = [
     "SpreadQuestion",
     "SweepColumn",
     "SweepTable",
-    "SweepTask",
     "read_sweep",
     "sweep",
 ]

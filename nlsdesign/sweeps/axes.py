@@ -338,18 +338,16 @@ def _box(
         if isinstance(given, str) or len(given) != 2:
             raise ValueRangeError(f"range of {name}", "has no two ends", next_step='write ["1 mm", "2 mm"]')
         column, values = subject.column(name, tuple(given), kind)
-        require_fractions(subject, name)
+        # The points of a sample lie between whole numbers.
+        if subject.is_whole(name):
+            raise ValueRangeError(
+                f"range of {name}", "takes whole numbers only, a sample has others",
+                next_step="list them (Listed), or take a GridAxis in steps of one",
+            )  # fmt: skip
         ends.append(_ends(column, values))
         columns.append(column)
     low, high = np.array(ends).T
     return tuple(columns), low, high
-
-
-def require_fractions(subject: Subject, name: str) -> None:
-    """Refuse a sample over whole numbers: its points lie between them."""
-    if subject.is_whole(name):
-        raise ValueRangeError(f"range of {name}", "takes whole numbers only, a sample has others",
-                              next_step="list them (Listed), or take a GridAxis in steps of one")  # fmt: skip
 
 
 def _distinct(name: str, rows: Sequence[Any]) -> None:
@@ -461,23 +459,9 @@ class SaltelliSample(AxisSet):
             from SALib.sample import sobol
         except ModuleNotFoundError:
             raise missing_library("a Saltelli sample", "SALib", "sensitivity") from None
-        columns, ends = [], []
-        for name, given in self.ranges.items():
-            column, values = subject.column(name, tuple(given), SALTELLI)
-            if column.lower is None or len(values) != 2 or not values[0] < values[1]:
-                raise ValueRangeError(
-                    f"range of {name}", "must be two ascending numbers", next_step='write ["1 mm", "2 mm"]'
-                )
-            require_fractions(subject, name)
-            columns.append(column)
-            ends.append([float(value) for value in values])
-        if not columns:
-            raise ValueRangeError(
-                "Saltelli sample", "has no ranges", next_step='write ranges = {"NAME" = [1, 2]}'
-            )
+        columns, low, high = _box(subject, self.ranges, SALTELLI)
         unit = {"num_vars": len(columns), "names": list(self.ranges), "bounds": [[0.0, 1.0]] * len(columns)}
         generator = np.random.default_rng(self.seed)
         points = sobol.sample(unit, self.count, calc_second_order=self.second_order, seed=generator)
-        low, high = np.array(ends).T
         rows = low + (high - low) * points
-        return BoundAxes(tuple(columns), len(rows), lambda number: tuple(rows[number].tolist()))
+        return BoundAxes(columns, len(rows), lambda number: tuple(rows[number].tolist()))

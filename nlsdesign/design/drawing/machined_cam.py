@@ -504,9 +504,9 @@ def _cable(contour: Contour, angle: float, beyond: float) -> Array:
     return np.vstack([contour.points[: last + 1], leaving])
 
 
-def as_quantity(given: Quantity | float, unit: str = "m") -> Quantity:
-    """Return a quantity."""
-    return given if isinstance(given, Quantity) else Quantity(given, unit)
+def as_quantity(given: Quantity | float) -> Quantity:
+    """Return a size as a quantity; a bare number is in m."""
+    return given if isinstance(given, Quantity) else Quantity(given, "m")
 
 
 def derived_size(value: float, how: str) -> Quantity:

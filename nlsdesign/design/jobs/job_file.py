@@ -248,22 +248,6 @@ def job_of(text: str, file: Path) -> DesignJob:
     ``file = "curve.csv"`` (beside the design file), which may hold a band too. Numbers carry their
     unit; bare ones are pure numbers, or rows in SI.
 
-    Parameters
-    ----------
-    text
-        TOML.
-    file
-        Where it came from, for messages and for the files that it names.
-
-    Raises
-    ------
-    DeckError
-        If a table is of the wrong kind; file, line and column are named.
-    UnknownNameError
-        If there is no such table, limit, goal, target or field, with the nearest that exists.
-    NlsError
-        If a number is refused by what it is for, with its place.
-
     Examples
     --------
     A file::

@@ -230,13 +230,7 @@ def _written_part(
 
 
 def design_summary(design: CamDesign) -> dict[str, Any]:
-    """Return the result of a design in numbers that JSON can hold, rounded to what they are good for.
-
-    Parameters
-    ----------
-    design
-        Finished.
-    """
+    """Return the result of a design in numbers that JSON can hold, rounded to what they are good for."""
     spread = {}
     if design.tolerance is not None:
         spread = {f"{100 * q.share:g} %": _rounded(q.value) for q in design.tolerance.quantiles}

@@ -137,7 +137,7 @@ class Loosened:
             ca.sum1(slacks),
             (*problem.structure, *rows),
         )
-        return program.with_unknowns(slacks, 0.0, _MOST)
+        return program.with_unknowns(slacks, _MOST)
 
     def least(self, names: Sequence[str], slacks: Sequence[int], start: Array | None = None) -> Solution:
         """Return where the sum of some slacks is least; the solution says whether it is one.

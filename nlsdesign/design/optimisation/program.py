@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -151,13 +151,13 @@ class Program:
     parameters: Expression | None = None  # symbols that get numbers at each solution; none for None
     iterations: int = 300  # at which the solver gives up
 
-    def with_unknowns(self, symbols: Expression, lower: float, upper: float) -> Program:
-        """Return a copy with more unknowns at the end, all between the same bounds."""
+    def with_unknowns(self, symbols: Expression, upper: float) -> Program:
+        """Return a copy with more unknowns at the end, all between zero and the same upper bound."""
         count = symbols.shape[0]
         return replace(
             self,
             unknowns=ca.vertcat(self.unknowns, symbols),
-            lower=np.append(self.lower, np.full(count, lower)),
+            lower=np.append(self.lower, np.zeros(count)),
             upper=np.append(self.upper, np.full(count, upper)),
         )
 
@@ -210,16 +210,10 @@ class Program:
         """Make the derivatives of searches beside a solution."""
         _ = self._warm
 
-    def solve_all(
-        self, starts: Sequence[Array], progress: Callable[[], None] = lambda: None
-    ) -> list[Solution]:
+    def solve_all(self, starts: Sequence[Array]) -> list[Solution]:
         """Solve from several starting points side by side on the cores; the order is kept."""
-        outcomes = []
         self.prepare()
-        for outcome in parallel_map(lambda number: self.solve(starts[number]), len(starts)):
-            outcomes.append(outcome)
-            progress()
-        return outcomes
+        return list(parallel_map(lambda number: self.solve(starts[number]), len(starts)))
 
     @cached_property
     def _solver(self) -> ca.Function:

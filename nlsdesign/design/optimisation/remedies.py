@@ -156,7 +156,7 @@ def hollow_contour(loose: Loosened) -> Hollow | None:
         lower[radii] = -upper[radii]
         rows = (*problem.structure, *kept, convex)
         program = Program(problem.vector, lower, upper, ca.sumsqr(hollow), rows)
-        program = program.with_unknowns(hollow, 0.0, _MOST)
+        program = program.with_unknowns(hollow, _MOST)
         begin = np.append(np.clip(loose.starts[0], lower, upper), np.ones(len(radii)))
         outcome = program.solve(begin)
         rho = problem.evaluate(problem.design.radii_of_curvature, outcome.point[: loose.count])

@@ -67,9 +67,10 @@ class DeclaredCam(ABC, Generic[Made]):
         return math.isfinite(self.anchor_distance)
 
     @property
-    @abstractmethod
     def anchor_distance(self) -> float:
-        """Distance of the anchor in m; infinite for a cable that stays parallel."""
+        """Distance of the anchor in m; infinite for a cable that stays parallel, and without a cable."""
+        anchor: Quantity | None = getattr(self.part, "anchor_distance", None)
+        return math.inf if anchor is None else anchor.number
 
     @abstractmethod
     def contour(self, last_angle: float | None, points: int) -> Contour:
@@ -87,47 +88,33 @@ class DeclaredCam(ABC, Generic[Made]):
         """
 
 
-@dataclass(frozen=True)
-class _TwoSided(DeclaredCam[TwoSidedCam]):
-    @property
-    def anchor_distance(self) -> float:
-        """Distance of the anchor in m."""
-        return self.part.anchor_distance.number
+class _BothSides(DeclaredCam[Made]):
+    """A cam whose lever arm changes sides over an angle at angle zero."""
 
+    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
+        """Return a cam with that lever arm, fitted through the law of this kind."""
+        part: Any = self.part
+        # The control values are fitted to h(θ) through the law of the cam, so that the change costs nothing
+        # where h starts at zero. A jump is rounded over the width.
+        width, (dense, wanted) = part.changeover.number, _dense(angles, lever_arms, count)
+        root = np.hypot(dense, width)
+        basis = spline_basis(dense**2 / (root + width), angles[-1], count) * (dense / root)[:, None]
+        values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
+        error = _largest(basis @ values - wanted, dense > 20.0 * width)
+        end = part.last_angle.with_value(float(angles[-1]), _SOURCE)
+        return CamFit(replace(part, lever_arm=_row(part.lever_arm, values), last_angle=end), error)
+
+
+class _TwoSided(_BothSides[TwoSidedCam]):
     def contour(self, last_angle: float | None, points: int) -> Contour:
         """Return the contour behind the change of sides or the onset."""
         angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
         # Beyond the change of sides the cable lies on the contour with the lever arm H(θ − w).
         arms = _lever_arms(self.part.lever_arm, self.part.last_angle, angles - self.part.changeover.number)
-        return contour_from_lever_arm(angles, arms, anchor_distance=self.part.anchor_distance.number)
-
-    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
-        """Return a cam with that lever arm, fitted through the law of this kind."""
-        values, error = _two_sides(self.part.changeover.number, angles, lever_arms, count)
-        cam = TwoSidedCam(
-            lever_arm=_row(self.part.lever_arm, values),
-            last_angle=self.part.last_angle.with_value(float(angles[-1]), _SOURCE),
-            changeover=self.part.changeover,
-            anchor_distance=self.part.anchor_distance,
-            elements=self.part.elements,
-            cable=self.part.cable,
-        )
-        return CamFit(cam, error)
+        return contour_from_lever_arm(angles, arms, anchor_distance=self.anchor_distance)
 
 
-def _two_sides(width: float, angles: Array, lever_arms: Array, count: int) -> tuple[Array, float]:
-    """Return control values of a cam that changes sides over an angle, and the largest error of its arm."""
-    # They are fitted to h(θ) through the law of the cam, so that the change costs nothing where h starts at
-    # zero. A jump is rounded over the width.
-    dense, wanted = _dense(angles, lever_arms, count)
-    root = np.hypot(dense, width)
-    basis = spline_basis(dense**2 / (root + width), angles[-1], count) * (dense / root)[:, None]
-    values = _solved(basis, wanted, dense >= (10.0 * width if _jumps(wanted) else 0.0))
-    error = _largest(basis @ values - wanted, dense > 20.0 * width)
-    return values, error
-
-
-class _Rolling(DeclaredCam[Made]):
+class _Rolling(_BothSides[Made]):
     """A cam without a cable."""
 
     @property
@@ -135,24 +122,12 @@ class _Rolling(DeclaredCam[Made]):
         """True: both sides are alike."""
         return True
 
-    @property
-    def anchor_distance(self) -> float:
-        """Infinite: there is no cable."""
-        return math.inf
-
     def law(self, last_angle: float | None, points: int) -> tuple[Array, scipy.interpolate.BSpline]:
         """Return angles, and the lever arm on its side as a spline."""
         part: Any = self.part
         end, row = part.last_angle.number, np.array(part.lever_arm.values)
         angles = np.linspace(0.0, _end(end, last_angle), points)
         return angles, scipy.interpolate.BSpline(end / (len(row) - 3) * np.arange(-3, len(row) + 1), row, 3)
-
-    def fitted(self, angles: Array, lever_arms: Array, count: int, anchor: float | None) -> CamFit:
-        """Return a cam with that lever arm, fitted through the law of this kind."""
-        part: Any = self.part
-        values, error = _two_sides(part.changeover.number, angles, lever_arms, count)
-        end = part.last_angle.with_value(float(angles[-1]), _SOURCE)
-        return CamFit(replace(part, lever_arm=_row(part.lever_arm, values), last_angle=end), error)
 
 
 class _Roller(_Rolling[RollerCam]):
@@ -179,13 +154,7 @@ class _Pair(_Rolling[RollingPair]):
         return pair_contour(Contour(angles / 2.0, p, spline(at), p + 2.0 * spline(at, 1), math.inf))
 
 
-@dataclass(frozen=True)
 class _OneSided(DeclaredCam[OneSidedCam]):
-    @property
-    def anchor_distance(self) -> float:
-        """Distance of the anchor in m."""
-        return math.inf
-
     def contour(self, last_angle: float | None, points: int) -> Contour:
         """Return the contour behind the change of sides or the onset."""
         angles = np.linspace(0.0, _end(self.part.last_angle.number, last_angle), points)
@@ -210,13 +179,7 @@ class _OneSided(DeclaredCam[OneSidedCam]):
         return CamFit(cam, error)
 
 
-@dataclass(frozen=True)
 class _Anchored(DeclaredCam[AnchoredCam]):
-    @property
-    def anchor_distance(self) -> float:
-        """Distance of the anchor in m."""
-        return self.part.anchor_distance.number
-
     def contour(self, last_angle: float | None, points: int) -> Contour:
         """Return the contour behind the change of sides or the onset."""
         end, anchor = self.part.last_direction.number, self.part.anchor_distance.number

@@ -149,22 +149,6 @@ def elastic_law(model: FlatModel, spring: str | None = None) -> ElasticLaw:
 
     At angle zero with a cam without lever arm the pretension is the extension of the element: that cuts the
     element out of the flat model. Inner states (of relaxation) stand where their derivatives vanish.
-
-    Parameters
-    ----------
-    model
-        Flat model of an assembly.
-    spring
-        Path of the cam spring; decided from the structure if it is left out.
-
-    Raises
-    ------
-    UnknownNameError
-        If there is no cam spring of that name.
-    ArrangementError
-        If the structure does not decide.
-    ConvergenceError
-        If the inner states find no equilibrium.
     """
     cam = series_cam(model, spring)
     place = {v.name: i for i, v in enumerate(model.parameters)}

@@ -42,29 +42,6 @@ def write_a2l(
 ) -> Path:
     """Write an A2L file: the numbers of a block as characteristics, what an instance holds as measurements.
 
-    Parameters
-    ----------
-    layout
-        Of the code.
-    path
-        File to write.
-    block
-        Name of the variable in the program that is the block to be calibrated, in memory that can be written.
-    instance
-        Name of the variable that is the instance of the code.
-    elf
-        Linked program with these two symbols, for their addresses; 0 stands for them without one.
-
-    Returns
-    -------
-    Path
-        That of the description.
-
-    Raises
-    ------
-    ExportError
-        If a name is no identifier, or the program cannot be read or lacks a symbol.
-
     Examples
     --------
     >>> write_a2l(source.layout, "joint.a2l", block="joint_block", elf="firmware.elf")  # doctest: +SKIP
@@ -126,14 +103,9 @@ def watched_entries(source: WatchSource, symbol: Symbol) -> Iterator[str]:
     assert fields is not None
 
     def row(name: str, text: str, at: int, is_number: bool = True, count: int = 1) -> Iterator[str]:
-        yield f"    /begin MEASUREMENT {_identifier(f'{source.name}.{name}')}"
+        about = (_identifier(f"{source.name}.{name}"), text, kind if is_number else "ULONG")
         limits = f"-{most} {most}" if is_number else "0 4294967295"
-        yield f"      {_string(text)} {kind if is_number else 'ULONG'} {_method('1')} 0 0 {limits}"
-        yield f"      ECU_ADDRESS {_address(symbol, at)}"
-        if count > 1:
-            yield f"      MATRIX_DIM {count}"
-        yield f'      SYMBOL_LINK "{symbol.name}" {at}'
-        yield "    /end MEASUREMENT"
+        yield from _measurement(symbol, about, at, ("1", limits), count=count)
 
     for name in ("magic", "version", "size", "judged", "word", "checksum"):
         yield from row(name, f"{name} of the record", int(fields[name][1]), is_number=False)
@@ -306,28 +278,34 @@ class _Description:
             start = int(places[group][1])
             for i, v in enumerate(getattr(layout, group)):
                 name, at = f"{layout.name}.{group}.{v.name}", start + i * self.width
-                yield from self._measurement(
-                    (_identifier(name), v.description, self.kind), at, (v.unit, self._limits(v))
-                )
+                about = (_identifier(name), v.description, self.kind)
+                yield from _measurement(self.instance, about, at, (v.unit, self._limits(v)))
         bits = "; ".join(f"bit {bit.bit_length() - 1}: {flag}" for flag, (bit, _) in STATUS_BITS.items())
         for name, text in (
             ("status", f"status word. {bits}"),
             ("loaded", "first digits of the deck in force"),
         ):
             at = int(places[name][1])
-            yield from self._measurement((f"{layout.name}.{name}", text, "ULONG"), at, ("1", "0 4294967295"))
-
-    def _measurement(self, about: tuple[str, str, str], at: int, shown: tuple[str, str]) -> Iterator[str]:
-        name, text, kind = about
-        yield f"    /begin MEASUREMENT {name}"
-        yield f"      {_string(text)} {kind} {_method(shown[0])} 0 0 {shown[1]}"
-        yield f"      ECU_ADDRESS {_address(self.instance, at)}"
-        yield f'      SYMBOL_LINK "{self.instance.name}" {at}'
-        yield "    /end MEASUREMENT"
+            about = (f"{layout.name}.{name}", text, "ULONG")
+            yield from _measurement(self.instance, about, at, ("1", "0 4294967295"))
 
     def _limits(self, v: Variable) -> str:
         most = self.layout.real.largest
         return f"{max(v.minimum, -most)!r} {min(v.maximum, most)!r}"
+
+
+def _measurement(
+    symbol: Symbol, about: tuple[str, str, str], at: int, shown: tuple[str, str], *, count: int = 1
+) -> Iterator[str]:
+    """Yield what is read of a variable: name, text and kind, then unit and limits."""
+    name, text, kind = about
+    yield f"    /begin MEASUREMENT {name}"
+    yield f"      {_string(text)} {kind} {_method(shown[0])} 0 0 {shown[1]}"
+    yield f"      ECU_ADDRESS {_address(symbol, at)}"
+    if count > 1:
+        yield f"      MATRIX_DIM {count}"
+    yield f'      SYMBOL_LINK "{symbol.name}" {at}'
+    yield "    /end MEASUREMENT"
 
 
 def _address(symbol: Symbol, at: int) -> str:

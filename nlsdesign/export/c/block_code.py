@@ -16,29 +16,7 @@ from .writer import CSource, CWriter, paths_in_memory
 def export_c_with_blocks(
     loadable: LoadableModel, folder: str | Path, *, real: Real | str = Real.DOUBLE, name: str | None = None
 ) -> tuple[CSource, BlockLayout]:
-    """Write C as :func:`~nlsdesign.export.export_c` does, which takes blocks of other numbers at run time.
-
-    Parameters
-    ----------
-    loadable
-        Discrete model with its coefficients.
-    folder
-        Where the files are written.
-    real
-        Type of the numbers, ``"double"`` or ``"float"``.
-    name
-        With which all C names begin; that of the model if it is left out.
-
-    Returns
-    -------
-    tuple
-        Names of the files, and the layout of the blocks.
-
-    Raises
-    ------
-    ExportError
-        If the model depends on time, cannot be written in C, or the folder cannot be written.
-    """
+    """Write C as :func:`~nlsdesign.export.export_c` does, which takes blocks of other numbers at run time."""
     number, prefix = Real.named(real), identifier(name or loadable.model.name)
     layout = block_layout(loadable, prefix, number, paths_in_memory)
     c = CWriter(loadable.model, prefix, number, loadable.coefficients)

@@ -30,23 +30,6 @@ def write_parameter_block(block: ParameterBlock, path: str | Path) -> Path:
     ``.bin`` holds the bytes of the structure, least significant first, ``.c`` a constant of that structure,
     ``.json`` names, values, units and ranges, from which the other two can be made again.
 
-    Parameters
-    ----------
-    block
-        Numbers for a generated code.
-    path
-        File to write, with one of these endings.
-
-    Returns
-    -------
-    Path
-        As it was given.
-
-    Raises
-    ------
-    ExportError
-        If the ending is another one, a number is out of its range, or the file cannot be written.
-
     Examples
     --------
     >>> write_parameter_block(block, "joint.bin")  # doctest: +SKIP
@@ -66,18 +49,6 @@ def write_parameter_block(block: ParameterBlock, path: str | Path) -> Path:
 
 def read_parameter_block(path: str | Path, code: BlockLayout | None = None) -> ParameterBlock:
     """Return a block from a ``.json`` or ``.bin`` file.
-
-    Parameters
-    ----------
-    path
-        File.
-    code
-        Of which code it must be; a ``.json`` says that itself, a ``.bin`` has no names.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be read, is damaged or edited, is of other code, or a number is out of its range.
 
     Examples
     --------

@@ -185,13 +185,7 @@ class ParameterBlock:
     recipe: Mapping[str, Any] = field(default_factory=dict)
 
     def check(self) -> None:
-        """Raise unless all numbers are finite and in their ranges.
-
-        Raises
-        ------
-        ExportError
-            With the first number that is not.
-        """
+        """Raise unless all numbers are finite and in their ranges."""
         layout = self.layout
         for v in (*layout.parameters, *layout.coefficients):
             self._require(v, self.values[v.name], f"'{v.name}'")
@@ -212,18 +206,7 @@ class ParameterBlock:
             )
 
     def with_values(self, values: Mapping[str, float]) -> ParameterBlock:
-        """Return the block with other parameters.
-
-        Parameters
-        ----------
-        values
-            In SI, by name.
-
-        Raises
-        ------
-        ExportError
-            If a name is no parameter, or a number is out of its range.
-        """
+        """Return the block with other parameters."""
         known = [v.name for v in self.layout.parameters]
         for name in values:
             if name not in known:

@@ -79,18 +79,7 @@ class LoadableModel:
         return hashlib.sha256(repr(steps).encode()).hexdigest()
 
     def numbers_of(self, other: FlatModel) -> BlockNumbers:
-        """Return the numbers with which these equations become those of another design.
-
-        Parameters
-        ----------
-        other
-            Designed alike for another deck.
-
-        Raises
-        ------
-        ExportError
-            If it has another form, interface or grid.
-        """
+        """Return the numbers with which these equations become those of another design."""
         _same_interface(self.model, other, len(self.parameters))
         solved: dict[int, float] = {}
         for name, form in self.forms.items():
@@ -105,20 +94,7 @@ class LoadableModel:
 
 
 def loadable_model(model: FlatModel, moved: FlatModel) -> LoadableModel:
-    """Return a discrete model with its coefficients as parameters.
-
-    Parameters
-    ----------
-    model
-        Observer, controller or both.
-    moved
-        The same design for numbers that all differ a little.
-
-    Raises
-    ------
-    ExportError
-        If both have different forms.
-    """
+    """Return a discrete model with its coefficients as parameters."""
     _same_interface(model, moved, len(model.parameters))
     names = [name for name in ("equations", "begin", "expected") if getattr(model, name) is not None]
     forms = {name: _form(getattr(moved, name)) for name in names}

@@ -108,7 +108,6 @@ class _Printer:
     """Writes values as C text; ``texts`` holds what stands for each value, ``lines`` the named constants."""
 
     real: Real
-    prefix: str
     own: Collection[str]
     texts: dict[int, _Text] = field(default_factory=dict)
     lines: list[str] = field(default_factory=list)
@@ -195,8 +194,8 @@ class _Printer:
         """Write a value as a named constant."""
         text = self.texts[index]
         kind = "int" if text.logical else self.real
-        self.lines.append(f"const {kind} {self.prefix}{index} = {text.text};")
-        self.texts[index] = _Text(f"{self.prefix}{index}", _ATOM, text.logical)
+        self.lines.append(f"const {kind} a{index} = {text.text};")
+        self.texts[index] = _Text(f"a{index}", _ATOM, text.logical)
 
 
 def print_statements(
@@ -205,18 +204,17 @@ def print_statements(
     targets: Sequence[Sequence[str]],
     *,
     real: Real,
-    prefix: str = "a",
     own: Collection[str] = (),
 ) -> list[str]:
     """Return C statements that compute the structural nonzeros of all results of an SX function.
 
     The nonzeros of its arguments are given as C text. Those of its results get left-hand sides such as
     ``"f[0]"`` or ``"const double y0"``; they are written last, so that a result may overwrite an argument.
-    Intermediate values are called ``<prefix><i>``; functions among ``own`` are those of :mod:`.elementary`.
+    Intermediate values are called ``a<i>``; functions among ``own`` are those of :mod:`.elementary`.
     An operation or a constant without a counterpart in C is an ``ExportError``.
     """
     graph = _Graph(function, inputs)
-    printer, uses, results = _Printer(real, prefix, own), graph.uses(), set(graph.results.values())
+    printer, uses, results = _Printer(real, own), graph.uses(), set(graph.results.values())
     for index, node in enumerate(graph.nodes):
         if not uses[index]:
             continue

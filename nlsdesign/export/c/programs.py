@@ -115,21 +115,6 @@ def write_examples(source: CSource) -> list[Path]:
     The main programs are a loop on a POSIX timer and a timer interrupt of a Cortex-M; both say where readings
     come from and where outputs go to. A supervisor turns the status word into the share of a command that
     may act. A third program answers a desk that plays a record through it, and a script is that desk.
-
-    Parameters
-    ----------
-    source
-        Files of the step, as :func:`~nlsdesign.export.export_c` writes them.
-
-    Returns
-    -------
-    list
-        Paths of the files that were written.
-
-    Raises
-    ------
-    ExportError
-        If a file cannot be written.
     """
     name, folder = source.name, source.header.parent
     values = {
@@ -209,23 +194,6 @@ def write_package(source: CSource, folder: Path) -> list[Path]:
     One folder serves all: ``library.json`` for PlatformIO, ``library.properties`` and a sketch for Arduino,
     ``zephyr/module.yml`` for Zephyr, ``CMakeLists.txt`` for CMake, with what ``find_package`` finds. Observer
     and controller as one step are also a transmission of ros2_control, in ``ros2_control/``.
-
-    Parameters
-    ----------
-    source
-        Files of the step, as :func:`~nlsdesign.export.export_c` writes them.
-    folder
-        Of the library; is made where it does not exist.
-
-    Returns
-    -------
-    list of Path
-        The files.
-
-    Raises
-    ------
-    ExportError
-        If a file cannot be written.
     """
     name, model = source.name, source.model
     described = comment(model.description).replace('"', "'")

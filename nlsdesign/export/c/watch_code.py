@@ -189,29 +189,7 @@ class WatchSource:
 def export_watch(
     plan: WatchPlan, folder: str | Path, *, real: Real | str = Real.FLOAT, name: str = "watch"
 ) -> WatchSource:
-    """Write the C of a monitor, with its self-test.
-
-    Parameters
-    ----------
-    plan
-        What it watches: :func:`~nlsdesign.regeneration.watch_plan`.
-    folder
-        Folder of the files; it is made if it is missing.
-    real
-        ``"double"`` or ``"float"``.
-    name
-        Prefix of all C names.
-
-    Returns
-    -------
-    WatchSource
-        Names of the files.
-
-    Raises
-    ------
-    ExportError
-        If there are more changes than the word has bits, or the folder cannot be written.
-    """
+    """Write the C of a monitor, with its self-test."""
     number, prefix = Real.named(real), identifier(name)
     if plan.first_bit(len(plan.blocks)) > 32:
         raise ExportError(f"deck '{plan.model.name}'", "has more numbers to watch than a word has bits",
@@ -488,25 +466,7 @@ def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
 
 
 def read_watch_record(path: str | Path, plan: WatchPlan) -> np.ndarray[Any, Any]:
-    """Return the evidence that a monitor has kept.
-
-    Parameters
-    ----------
-    path
-        File with the bytes of a record, sealed.
-    plan
-        What was watched.
-
-    Returns
-    -------
-    numpy.ndarray
-        One record of the fields of the C, shape ().
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be read, is damaged, or is of another deck or another monitor.
-    """
+    """Return the evidence that a monitor has kept."""
     place = str(path)
     try:
         content = Path(path).read_bytes()

@@ -126,15 +126,7 @@ class FmuSystem:
     order: tuple[str, ...] = ()
 
     def recorded(self) -> list[str]:
-        """Return the names of what a run would record, without running anything.
-
-        Raises
-        ------
-        ExportError
-            If an FMU is damaged or cannot be used.
-        UnknownNameError
-            If a wire names what does not exist.
-        """
+        """Return the names of what a run would record, without running anything."""
         with tempfile.TemporaryDirectory(prefix="nlsdesign-cosimulation-") as folder:
             descriptions = unpacked_fmus(self.fmus, Path(folder))
             check_wires(descriptions, {target: as_wire(source) for target, source in self.wires.items()})
@@ -149,24 +141,7 @@ class FmuSystem:
         stepping: Stepping | None = None,
         parts: int = 1,
     ) -> CoSimulation:
-        """Simulate; see :func:`cosimulate`.
-
-        Parameters
-        ----------
-        inputs
-            Signals from outside by input.
-        stop
-            End in s.
-        stepping
-            Step, coupling, and limits.
-        parts
-            Parts into which each step is divided once more.
-
-        Raises
-        ------
-        ValueRangeError
-            If the end is not a positive number of seconds.
-        """
+        """Simulate; see :func:`cosimulate`."""
         if not (math.isfinite(stop) and stop > 0.0):
             raise ValueRangeError(f"stop={stop}", "must be a positive number of seconds")
         check_order(self.order, self.fmus)

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import tempfile
-import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +18,7 @@ from xml.etree import ElementTree
 from ...foundation.errors import ExportError, UnitError, ValueRangeError
 from ...foundation.locations import version as package_version
 from ...foundation.quantity import BASE, Quantity, Unit, parse_unit
-from ...foundation.text_files import draft
-from ..files import xml_text
+from ..files import write_archive, xml_text
 from .cosimulate import FmuSystem, check_order, check_signals, unpacked_fmus
 from .fmu_description import FmuDescription, FmuScalar, fit_to_show, unpack
 from .run_plan import Wire, as_wire, check_wires, delay_of, gain_to, split_name
@@ -244,9 +242,6 @@ def _unit(connector: ElementTree.Element) -> Unit | None:
     return None
 
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)
-
-
 @dataclass(frozen=True)
 class WrittenSystem:
     """An SSP archive that was written."""
@@ -312,13 +307,7 @@ def write_ssp(
                 entries[f"{RESOURCES}/{name}.fmu"] = Path(file).read_bytes()
             except OSError as error:
                 raise ExportError(str(file), f"cannot be read ({error.strerror or error})") from error
-    with draft(Path(path)) as file_name, zipfile.ZipFile(file_name, "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, content in entries.items():
-            entry = zipfile.ZipInfo(name, _EPOCH)
-            entry.external_attr = 0o644 << 16
-            # An FMU is compressed already.
-            entry.compress_type = zipfile.ZIP_STORED if name.endswith(".fmu") else zipfile.ZIP_DEFLATED
-            archive.writestr(entry, content)
+    write_archive(Path(path), entries)
     return WrittenSystem(Path(path), tuple(writer.notes))
 
 

@@ -14,14 +14,13 @@ import math
 import os
 import struct
 import tempfile
-import zipfile
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import lru_cache
 from pathlib import Path
 
 from ...foundation.errors import ExportError, ValueRangeError, nearest
-from ...foundation.text_files import draft, write_bytes
+from ...foundation.text_files import write_bytes
 from ...model.flat import FlatModel
 from ..c.c_text import identifier
 from ..compilation import cross_compiler
@@ -33,7 +32,7 @@ from ..compilation.cross_compiler import (
     compile_library,
     flags_of_environment,
 )
-from ..files import template
+from ..files import template, write_archive
 from .fmu_documentation import Authorship, icon, page, with_origin
 from .fmu_sources import fmu_sources, main_source
 from .fmu_variables import layout, terminals
@@ -122,7 +121,6 @@ def _keep(kept: Path, binary: bytes) -> None:
         return  # without a cache the next export takes longer, that is all
 
 
-_EPOCH = (1980, 1, 1, 0, 0, 0)
 _TOKEN = "{token-of-this-content}"
 
 
@@ -194,15 +192,10 @@ def export_fmu(
     target = Path(path)
     with tempfile.TemporaryDirectory(prefix="nlsdesign-fmu-") as folder:
         binaries = _binaries(contents, Path(folder), identifier(model.name), version, chosen)
-    with draft(target) as file:
-        parts = with_origin(model, contents | binaries)
-        with zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as archive:
-            # The description first, the rest in alphabetical order; no time stamps and no local permissions.
-            for name in sorted(parts, key=lambda name: (name != "modelDescription.xml", name)):
-                entry = zipfile.ZipInfo(name, _EPOCH)
-                entry.external_attr = (0o755 if name.startswith("binaries/") else 0o644) << 16
-                entry.compress_type = zipfile.ZIP_DEFLATED
-                archive.writestr(entry, parts[name])
+    parts = with_origin(model, contents | binaries)
+    # The description first, the rest in alphabetical order.
+    order = sorted(parts, key=lambda name: (name != "modelDescription.xml", name))
+    write_archive(target, {name: parts[name] for name in order})
     return target
 
 

@@ -524,12 +524,12 @@ def _named_once(model: FlatModel) -> tuple[list[Variable], list[Variable]]:
     return kept["output"], kept["signal"]
 
 
-def _probes(model: FlatModel, points: int = 5) -> dict[str, Array]:
-    """Return states, inputs, outputs and signals at several points, to find equal ones."""
+def _probes(model: FlatModel) -> dict[str, Array]:
+    """Return states, inputs, outputs and signals at five points, to find equal ones."""
     generator = np.random.default_rng(1)
     parameters = model.start(model.parameters)
     samples: dict[str, list[Array]] = {"state": [], "input": [], "output": [], "signal": []}
-    for _ in range(points):
+    for _ in range(5):
         x, u = (_around(group, generator) for group in (model.states, model.inputs))
         _, y, s, _ = model.equations(0.0, x, u, parameters, model.look_up(x.tolist(), u.tolist()))
         for kind, values in zip(samples, (x, u, y, s), strict=True):

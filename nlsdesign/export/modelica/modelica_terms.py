@@ -136,7 +136,14 @@ def term(operation: int, operands: Sequence[Term]) -> Term:
         joined = replace(one, opposite=(other.text, other.strength), events=True)
         return replace(joined, size=size)
     if operation == ca.OP_IF_ELSE_ZERO:
-        return _choice(operands[0].as_truth(), operands[1].as_number(), size)
+        condition = operands[0].as_truth()
+        number = operands[1].as_number()
+        opposite = (condition.opposite or ("", ATOM))[0]
+        # The same condition and its negation are recognised by the alphabetically first of the two texts.
+        negated = opposite < condition.text
+        key = opposite if negated else condition.text
+        text = f"if {condition.text} then {number.inside(OR)} else 0.0"
+        return Term(text, CHOICE, events=True, size=size, choice=(key, negated, number.inside(OR)))
     numbers = [each.as_number() for each in operands]
     if operation in _RELATIONS:
         texts = [each.inside(SUM) for each in numbers]
@@ -156,15 +163,6 @@ def term(operation: int, operands: Sequence[Term]) -> Term:
         )
     text, strength = _ARITHMETIC[operation](*numbers)
     return Term(text, strength, events=events or operation in SERIES, size=size)
-
-
-def _choice(condition: Term, number: Term, size: int) -> Term:
-    opposite = (condition.opposite or ("", ATOM))[0]
-    # The same condition and its negation are recognised by the alphabetically first of the two texts.
-    negated = opposite < condition.text
-    key = opposite if negated else condition.text
-    text = f"if {condition.text} then {number.inside(OR)} else 0.0"
-    return Term(text, CHOICE, events=True, size=size, choice=(key, negated, number.inside(OR)))
 
 
 def _whole_choice(a: Term, b: Term) -> str | None:

@@ -40,11 +40,6 @@ class NoiseAssumptions:
         Standard deviation of what the inner states do of their own, as a share of their typical sizes.
     sample_time
         In s.
-
-    Raises
-    ------
-    ValueRangeError
-        If a share is negative, or the sample time not positive.
     """
 
     torque: float = 0.01
@@ -56,13 +51,7 @@ class NoiseAssumptions:
             raise ValueRangeError(str(self), "shares must not be negative, and a sample time positive")
 
     def process(self, points: RestPoints) -> dict[str, float]:
-        """Return the density of white noise of each state, in its unit per √s.
-
-        Parameters
-        ----------
-        points
-            The model at rest at each angle.
-        """
+        """Return the density of white noise of each state, in its unit per √s."""
         names, largest = points.state_names, np.max(np.abs(points.moving.rates), axis=0)
         decay = np.median(np.abs(np.einsum("Nii->Ni", points.moving.a)), axis=0)
         densities = {}

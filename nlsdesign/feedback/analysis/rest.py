@@ -234,24 +234,7 @@ class RangeAtRest(NamedTuple):
 
 
 def ranges_at_rest(model: FlatModel, angles: Array, *, angle: str) -> tuple[RangeAtRest, ...]:
-    """Return the laws that are used outside of their stated range while the machine rests at some angles.
-
-    Parameters
-    ----------
-    model
-        Continuous.
-    angles
-        Shape (N,), in rad.
-    angle
-        State that is swept.
-
-    Raises
-    ------
-    ValueRangeError
-        If an angle is not finite.
-    ConvergenceError
-        If the model does not come to rest.
-    """
+    """Return the laws that are used outside of their stated range while the machine rests at some angles."""
     bounded = [(i, v) for i, v in enumerate(model.signals) if v.bounded]
     if not bounded:
         return ()

@@ -20,9 +20,12 @@ from .evaluation.responses import (
     zero_torque,
 )
 from .evaluation.whole_evaluation import BIAS as BIAS
-from .evaluation.whole_evaluation import LoopEvaluation, LoopRange, cascade_loops, evaluate_loop
+from .evaluation.whole_evaluation import LoopEvaluation, evaluate_loop
+from .evaluation.whole_evaluation import LoopRange as LoopRange
+from .evaluation.whole_evaluation import cascade_loops as cascade_loops
 from .evaluation.whole_evaluation import with_margin as with_margin
-from .laws.known_drive import check_torque, largest_torque
+from .laws.known_drive import check_torque
+from .laws.known_drive import largest_torque as largest_torque
 from .laws.law_writer import BackCalculation, ConditionalIntegration
 from .laws.outer_laws import FilteredDifference, GivenRate, PidTorque, ScheduledTorque, TorqueLaw
 from .laws.torque_loop import REPRODUCED_GAINS, TorqueGains, torque_controller
@@ -44,7 +47,6 @@ __all__ = [
     "LoopJudge",
     "LoopLimits",
     "LoopMargins",
-    "LoopRange",
     "LoopSpread",
     "LoopVerdict",
     "OutputImpedance",
@@ -58,13 +60,11 @@ __all__ = [
     "ZeroTorque",
     "bandwidth_against_impedance",
     "best_choices",
-    "cascade_loops",
     "check_torque",
     "encoder_loop",
     "evaluate_loop",
     "joined",
     "largest_gain",
-    "largest_torque",
     "loop_margins",
     "loop_over_spread",
     "onset_of_limit_cycling",

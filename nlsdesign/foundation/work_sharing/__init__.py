@@ -4,20 +4,19 @@ Sweeps import it. It knows functions, points and workers, and nothing of what is
 room that may import ``distributed``, ``dask`` and ``mpi4py``.
 """
 
-from .chunks import CodeIdentity, PointOutcome, code_identity
+from .chunks import CodeIdentity as CodeIdentity
+from .chunks import PointOutcome as PointOutcome
+from .chunks import code_identity as code_identity
 from .dask_scheduler import DaskScheduler
 from .shared_map import parallel_map, shared_map, spread_over
-from .teams import Executor, InThisProcess, MpiRanks, Processes
+from .teams import Executor as Executor
+from .teams import InThisProcess, Processes
+from .teams import MpiRanks as MpiRanks
 
 __all__ = [
-    "CodeIdentity",
     "DaskScheduler",
-    "Executor",
     "InThisProcess",
-    "MpiRanks",
-    "PointOutcome",
     "Processes",
-    "code_identity",
     "parallel_map",
     "shared_map",
     "spread_over",

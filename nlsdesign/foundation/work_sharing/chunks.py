@@ -55,13 +55,7 @@ class CodeIdentity:
 
 @functools.cache
 def code_identity(package: Path = _PACKAGE) -> CodeIdentity:
-    """Return the identity of the package as it stands on disk, read once in each process.
-
-    Parameters
-    ----------
-    package
-        Folder of the package; another one only in tests.
-    """
+    """Return the identity of the package as it stands on disk, read once in each process."""
     files = dict(_digests(package))
     text = "\n".join(f"{name} {digest}" for name, digest in sorted(files.items()))
     return CodeIdentity(version(package=package), hashlib.sha256(text.encode()).hexdigest(), files)

@@ -64,13 +64,7 @@ class Executor(Protocol):
     """Where work is done; chosen by the caller."""
 
     def team(self, work: Callable[[Any], Any]) -> AbstractContextManager[Team]:
-        """Return workers for one function; they end with the block.
-
-        Parameters
-        ----------
-        work
-            Asked of each point.
-        """
+        """Return workers for one function; they end with the block."""
         ...
 
 
@@ -261,15 +255,7 @@ class MpiRanks:
 
     @contextmanager
     def team(self, work: Callable[[Any], Any]) -> Iterator[Team]:
-        """Yield the other ranks; ``work`` is pickled.
-
-        Raises
-        ------
-        MissingLibraryError
-            If mpi4py is not installed.
-        WorkSharingError
-            If there is no other rank.
-        """
+        """Yield the other ranks; ``work`` is pickled."""
         try:
             from mpi4py import futures
         except ModuleNotFoundError:

@@ -27,9 +27,11 @@ from .loop_evaluation import (
     impedance_over_frequency,
     margins_over_angle,
     torque_responses,
-    write_loop_figures,
 )
 from .loop_evaluation import passivity_words as passivity_words
+from .loop_evaluation import (
+    write_loop_figures as write_loop_figures,
+)
 from .over_angle import errors_over_spread, observability_over_angle, ranked_intervals, stability_over_angle
 from .over_time import closed_loop, closed_loop_of, observer_error, over_time
 from .style import compact
@@ -75,5 +77,4 @@ __all__ = [
     "torque_responses",
     "workshop_drawing",
     "write_figures",
-    "write_loop_figures",
 ]

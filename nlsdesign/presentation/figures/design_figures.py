@@ -72,9 +72,9 @@ def design_picture(design: CamDesign) -> Figure:
     figure.set_figheight(2.0 * (WIDTH - 0.8) * (high + 2.0 - low) / ((wide - left) * MM) + 1.2)
     radius, y = float(design.contour.radii.max()) * MM, low + 0.02 * (wide - left) * MM
     anchor = float(_end_of_cable(design.contour, radius / MM)[0]) * MM
-    _dimension(axes[0], 0.0, radius, y, f"R {radius:.1f}")
+    _dimension(axes[0], radius, y, f"R {radius:.1f}")
     if design.contour.anchor_distance * MM == anchor:
-        _dimension(axes[0], 0.0, -anchor, y, f"anchor {anchor:.1f}")
+        _dimension(axes[0], -anchor, y, f"anchor {anchor:.1f}")
     axes[1].set_xlabel(f"distance from the centre in mm{piece.note}")
     return described(
         figure,
@@ -215,12 +215,12 @@ def _piece(design: CamDesign) -> _Piece:
     return _Piece()
 
 
-def _dimension(axes: Axes, left: float, right: float, y: float, text: str) -> None:
-    axes.plot([left, right], [y, y], color=MUTED.light, linewidth=0.8)
-    for end in (left, right):
-        axes.plot([end, end], [y - 0.6, y + 0.6], color=MUTED.light, linewidth=0.8)
+def _dimension(axes: Axes, end: float, y: float, text: str) -> None:
+    axes.plot([0.0, end], [y, y], color=MUTED.light, linewidth=0.8)
+    for x in (0.0, end):
+        axes.plot([x, x], [y - 0.6, y + 0.6], color=MUTED.light, linewidth=0.8)
     axes.annotate(
-        text, ((left + right) / 2, y), (0, 2), textcoords="offset points", ha="center", fontsize=7.5,
+        text, (end / 2, y), (0, 2), textcoords="offset points", ha="center", fontsize=7.5,
         color=INK.light,
     )  # fmt: skip
 

@@ -188,15 +188,7 @@ def _response_words(label: str, response: SineResponse, lost: Sequence[float]) -
 
 
 def write_loop_figures(result: LoopEvaluation, folder: Path) -> list[Path]:
-    """Write what is drawn of an evaluated torque loop as SVG files.
-
-    Parameters
-    ----------
-    result
-        Of the evaluation.
-    folder
-        Is made where it does not exist.
-    """
+    """Write what is drawn of an evaluated torque loop as SVG files."""
     make_folder(folder)
     drawn = {
         "responses": torque_responses(result.responses, result.line),

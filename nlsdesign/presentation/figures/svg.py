@@ -350,10 +350,10 @@ COLUMNS, ROWS = 700, 400
 """Finest grid that a full-width panel can show on paper and on screen."""
 
 
-def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Array, Array]:
+def thinned(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:
     """Return a line with fewer points that looks the same.
 
-    Over an ascending x each of ``columns`` intervals keeps its first, last, lowest and highest point, so no
+    Over an ascending x each of ``COLUMNS`` intervals keeps its first, last, lowest and highest point, so no
     peak is lost. Otherwise (a loop) points are left out that fall into the same cell of the figure as the one
     before. Short lines come back as they are.
 
@@ -361,18 +361,14 @@ def thinned(x: ArrayLike, y: ArrayLike, *, columns: int = COLUMNS) -> tuple[Arra
     the given line in the given order.
     """
     abscissa, ordinate = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-    if len(abscissa) <= 2 * columns:
+    if len(abscissa) <= 2 * COLUMNS:
         return abscissa, ordinate
-    keep = (
-        _envelope(abscissa, ordinate, columns)
-        if np.all(np.diff(abscissa) > 0.0)
-        else _cells(abscissa, ordinate)
-    )
+    keep = _envelope(abscissa, ordinate) if np.all(np.diff(abscissa) > 0.0) else _cells(abscissa, ordinate)
     return abscissa[keep], ordinate[keep]
 
 
-def _envelope(x: Array, y: Array, columns: int) -> Indices:
-    edges = np.searchsorted(x, np.linspace(x[0], x[-1], columns + 1)[1:-1])
+def _envelope(x: Array, y: Array) -> Indices:
+    edges = np.searchsorted(x, np.linspace(x[0], x[-1], COLUMNS + 1)[1:-1])
     parts = [part for part in np.split(np.arange(len(x)), edges) if len(part)]
     kept: set[int] = set()
     for part in parts:

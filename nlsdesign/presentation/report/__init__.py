@@ -2,13 +2,22 @@
 
 from .command_pages import SIZES as SIZES
 from .command_pages import (
-    write_analysis_report,
-    write_diagnosis_report,
-    write_fit_report,
-    write_observer_report,
-    write_simulation_report,
+    write_analysis_report as write_analysis_report,
 )
-from .design_sections import CamSection, design_sections, tolerance_sections, write_design_report
+from .command_pages import (
+    write_diagnosis_report as write_diagnosis_report,
+)
+from .command_pages import (
+    write_fit_report as write_fit_report,
+)
+from .command_pages import (
+    write_observer_report as write_observer_report,
+)
+from .command_pages import (
+    write_simulation_report as write_simulation_report,
+)
+from .design_sections import CamSection, design_sections, tolerance_sections
+from .design_sections import write_design_report as write_design_report
 from .diagnosis_sections import verdict_sections
 from .sections import (
     Chapter,
@@ -22,7 +31,10 @@ from .sections import (
     TextSection,
     write_report,
 )
-from .side_by_side import ComparedResult, differing_numbers, key_figures, write_comparison
+from .side_by_side import ComparedResult as ComparedResult
+from .side_by_side import differing_numbers as differing_numbers
+from .side_by_side import key_figures as key_figures
+from .side_by_side import write_comparison
 from .tables import (
     OUTCOMES,
     CalculationSection,
@@ -39,7 +51,6 @@ __all__ = [
     "CalculationStep",
     "CamSection",
     "Chapter",
-    "ComparedResult",
     "EquationsSection",
     "FigureSection",
     "FileSection",
@@ -52,17 +63,9 @@ __all__ = [
     "TextSection",
     "comparison_table",
     "design_sections",
-    "differing_numbers",
-    "key_figures",
     "numbers_table",
     "tolerance_sections",
     "verdict_sections",
-    "write_analysis_report",
     "write_comparison",
-    "write_design_report",
-    "write_diagnosis_report",
-    "write_fit_report",
-    "write_observer_report",
     "write_report",
-    "write_simulation_report",
 ]

@@ -43,24 +43,7 @@ if TYPE_CHECKING:
 
 
 def write_fit_report(path: Path, result: Refit, *, facts: Mapping[str, str], files: Sequence[Path]) -> Path:
-    """Write the report on a fit: errors with the declared and the fitted numbers, and the numbers.
-
-    Parameters
-    ----------
-    path
-        File to write, ending in ``.html``.
-    result
-        Of the fit.
-    facts
-        Short texts by name, for instance deck and records.
-    files
-        Written beside the report.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write the report on a fit: errors with the declared and the fitted numbers, and the numbers."""
     errors = result.errors()
     keys = tuple(
         KeyNumber(
@@ -104,28 +87,7 @@ def write_analysis_report(
     ranking: SensorRanking | None,
     files: Sequence[Path] = (),
 ) -> Path:
-    """Write the report on an analysis over the angle: what the sensors do not show, poles, further sensors.
-
-    Parameters
-    ----------
-    path
-        File to write, ending in ``.html``.
-    chart
-        Over the angle.
-    drops
-        Exact angles at which a state does not show.
-    model
-        Its name.
-    ranking
-        Which sensor would help most; ``None`` where none were ranked.
-    files
-        Written beside the report.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write the report on an analysis over the angle: what sensors do not show, poles, further sensors."""
     stiffness = chart["stiffness.slow"]
     low, high = (three_digits(float(end)) for end in (np.min(stiffness), np.max(stiffness)))
     seen = "at every angle" if drops.detectable else "not everywhere"
@@ -163,26 +125,7 @@ def write_analysis_report(
 def write_observer_report(
     path: Path, model: FlatModel, errors: SpreadErrors, *, words: Sequence[str], files: Sequence[Path]
 ) -> Path:
-    """Write the report on an observer: its torque errors over the spread beside others, and their causes.
-
-    Parameters
-    ----------
-    path
-        File to write, ending in ``.html``.
-    model
-        The observer.
-    errors
-        Of it, first, and of those that it is compared with.
-    words
-        What is said of it, one sentence or drawing of several lines each.
-    files
-        Written beside the report.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write the report on an observer: its torque errors over the spread beside others, and their causes."""
     first, unit = errors.observers[0], typeset_unit(errors.unit)
     causes = errors.ranked_causes(first)
     factor, shown = shared_prefix([size for _, size in causes], errors.unit)
@@ -235,26 +178,7 @@ def write_diagnosis_report(
     regenerated: tuple[Regeneration, Mapping[Path, str]] | None = None,
     exported: Mapping[Path, str] = MappingProxyType({}),
 ) -> Path:
-    """Write the report on a diagnosis.
-
-    Parameters
-    ----------
-    path
-        File to write, ending in ``.html``.
-    verdict
-        Of the diagnosis.
-    facts
-        Short texts by name, for instance deck and records.
-    regenerated
-        The observer of the better model and its files, where one was designed.
-    exported
-        Files of the better machine with a few words on each.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write the report on a diagnosis."""
     chapter: list[Section] = []
     if regenerated:
         chapter += regeneration_sections(regenerated[0], {**regenerated[1], **exported})
@@ -277,33 +201,7 @@ def write_simulation_report(
     facts: Mapping[str, str],
     warnings: Sequence[str] = (),
 ) -> list[Path]:
-    """Write the picture of a run and a page with it; the table of the run stands beside them.
-
-    Parameters
-    ----------
-    path
-        Table of the run; picture and page differ in their ending.
-    model
-        That was simulated.
-    run
-        All signals.
-    signals
-        What is drawn and listed.
-    facts
-        Short texts by name, for instance the deck.
-    warnings
-        Of laws that leave their range and limits that are reached.
-
-    Returns
-    -------
-    list of Path
-        Picture and page.
-
-    Raises
-    ------
-    ExportError
-        If a file cannot be written.
-    """
+    """Write the picture of a run and a page with it; the table of the run stands beside them."""
     picture = run_over_time(run, signals)
     (file,) = write_figures(path.parent, {path.stem: picture})
     sizes: list[tuple[str | float, ...]] = [

@@ -106,26 +106,7 @@ def write_design_report(
     remarks: Sequence[str] = (),
     files: Sequence[Path] = (),
 ) -> Path:
-    """Write the report on a design, whether it meets its target or not.
-
-    Parameters
-    ----------
-    path
-        File to write, ending in ``.html``.
-    design
-        Finished.
-    deck
-        Name of the deck that it began with.
-    remarks
-        What was said beside it, in sentences.
-    files
-        Written beside the report.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write the report on a design, whether it meets its target or not."""
     missed = [] if design.miss is None else [f"The design misses its target: {design.miss.words}."]
     words = [*missed, *remarks]
     sections: list[Section] = [NumbersSection("Key numbers", _key_numbers(design))]

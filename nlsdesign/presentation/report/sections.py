@@ -469,7 +469,19 @@ def report_text(
 ) -> str:
     """Return a report as text; the same for the same sections."""
     pieces = list(sections)
-    entries = _entries(folder, pieces)
+    if not pieces:
+        raise ValueRangeError("report", "has no section", next_step="give write_report at least one")
+    entries, inside = [], False
+    places = [PagePosition(f"s{number}", folder) for number in range(1, len(pieces) + 1)]
+    # Drawing the figures takes the time, so each core draws some of them.
+    contents = parallel_map(lambda k: pieces[k].content(places[k]), len(pieces))
+    for section, place, content in zip(pieces, places, contents, strict=True):
+        chapter = isinstance(section, Chapter)
+        inside = inside or chapter
+        entries.append({
+            "title": section.title, "template": section.template, "key": place.key,
+            "level": 2 if chapter or not inside else 3, "content": content,
+        })  # fmt: skip
     script = "\n".join(
         _source(name)
         for name in dict.fromkeys(["report.js", *[section.script for section in pieces if section.script]])
@@ -487,23 +499,6 @@ def report_text(
         light=light, dark=dark, script=Html(script), script_digest=digest,
     )  # fmt: skip
     return visible(page)
-
-
-def _entries(folder: Path, sections: list[Section]) -> list[dict[str, Any]]:
-    if not sections:
-        raise ValueRangeError("report", "has no section", next_step="give write_report at least one")
-    entries, inside = [], False
-    places = [PagePosition(f"s{number}", folder) for number in range(1, len(sections) + 1)]
-    # Drawing the figures takes the time, so each core draws some of them.
-    contents = parallel_map(lambda k: sections[k].content(places[k]), len(sections))
-    for section, place, content in zip(sections, places, contents, strict=True):
-        chapter = isinstance(section, Chapter)
-        inside = inside or chapter
-        entries.append({
-            "title": section.title, "template": section.template, "key": place.key,
-            "level": 2 if chapter or not inside else 3, "content": content,
-        })  # fmt: skip
-    return entries
 
 
 @lru_cache(maxsize=1)

@@ -85,13 +85,7 @@ def write_comparison(path: Path, results: Sequence[ComparedResult]) -> Path:
 
 
 def key_figures(results: Sequence[ComparedResult]) -> dict[str, list[str]]:
-    """Return the key figures as text: by what they are, one for each result.
-
-    Parameters
-    ----------
-    results
-        To be compared.
-    """
+    """Return the key figures as text: by what they are, one for each result."""
     rows: dict[str, Callable[[ComparedResult], str]] = {
         "deck": lambda r: r.model.name,
         "target": lambda r: {True: "met", False: "missed"}.get(r.design.get("met"), _NONE),  # type: ignore[arg-type]
@@ -115,13 +109,7 @@ def key_figures(results: Sequence[ComparedResult]) -> dict[str, list[str]]:
 
 
 def differing_numbers(results: Sequence[ComparedResult]) -> dict[str, list[str]]:
-    """Return the numbers of the decks that are not the same in all results: by name, one text for each.
-
-    Parameters
-    ----------
-    results
-        To be compared.
-    """
+    """Return the numbers of the decks that are not the same in all results: by name, one text for each."""
     names = dict.fromkeys(name for each in results for name in each.numbers)
     rows = {}
     for name in names:

@@ -12,7 +12,7 @@ from urllib.parse import quote
 from ...foundation.errors import unknown_name, visible
 from ...foundation.quantity import Quantity, sources, typeset_number, typeset_unit
 from ..figures.style import compact
-from .sections import Html, PagePosition, Section, TableSection
+from .sections import Html, PagePosition, Section, TableSection, inner_sections
 
 if TYPE_CHECKING:
     from ...model.symbolic_view import Equations
@@ -225,14 +225,10 @@ class CalculationSection(Section):
             {"words": s.words, "formula": "" if s.formula is None else typeset(s.formula), "latex": s.latex}
             for s in self.steps
         ]
-        inner = [place.inner(i) for i, _ in enumerate(self.parts, start=1)]
-        parts = [
-            {"title": part.title, "template": part.template, "key": at.key, **part.content(at)}
-            for at, part in zip(inner, self.parts, strict=True)
-        ]
         return {
             "statement": self.statement, "verdict": self.verdict, "tone": OUTCOMES[self.verdict],
-            "steps": steps, "why": self.why, "numbers": self.numbers, "parts": parts,
+            "steps": steps, "why": self.why, "numbers": self.numbers,
+            "parts": inner_sections(self.parts, place),
         }  # fmt: skip
 
 

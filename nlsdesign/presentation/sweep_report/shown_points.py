@@ -145,9 +145,9 @@ def _number(value: float) -> float | int | str | None:
     return int(short) if short.is_integer() and abs(short) < 1e9 else short
 
 
-def listed_names(names: list[str], most: int = 8) -> str:
+def listed_names(names: list[str]) -> str:
     """Return names as text, the first of them."""
-    return ", ".join(f"`{name}`" for name in names[:most]) + (", …" if len(names) > most else "")
+    return ", ".join(f"`{name}`" for name in names[:8]) + (", …" if len(names) > 8 else "")
 
 
 class PageContent(NamedTuple):

@@ -275,19 +275,7 @@ def evaluate_loop(
 def cascade_loops(
     fixed: FlatModel, moved: FlatModel, *, delay: int, sample_time: float, **law: Any
 ) -> tuple[ClosedLoop, ClosedLoop]:
-    """Return the torque loop with its load fixed and with it moved; one observer and controller for both.
-
-    Parameters
-    ----------
-    fixed, moved
-        The machine as declared, and with the motion of its load prescribed.
-    delay
-        Samples between a current's computation and its effect.
-    sample_time
-        In s.
-    **law
-        As for :func:`~nlsdesign.feedback.control.torque_controller`: law, gains, velocity.
-    """
+    """Return the torque loop with its load fixed and with it moved; one observer and controller for both."""
     plants = [with_outputs(m, [measured_motion(m), series_spring(m).effort]) for m in (fixed, moved)]
     # What a corrected observer has learned depends on what went before, so a loop with it has no one figure.
     observer = design_observer(plants[0], sample_time=sample_time, gain=CascadeGain())

@@ -356,13 +356,7 @@ def torque_limit(plant: FlatModel) -> TorqueLimit:
 
 
 def largest_torque(plant: FlatModel) -> float:
-    """Return the largest torque in N·m that a drive can hold in its series spring; see :func:`torque_limit`.
-
-    Parameters
-    ----------
-    plant
-        Continuous, load fixed or prescribed.
-    """
+    """Return the largest torque in N·m that a drive can hold in its spring; see :func:`torque_limit`."""
     return torque_limit(plant).torque
 
 

@@ -16,15 +16,6 @@ from .law_writer import GAIN, AntiWindup, ConditionalIntegration, Integration, L
 from .outer_laws import Heard, HeldBack, SpeedCommand, check_settings
 
 
-class MotorBalance(NamedTuple):
-    """What a disturbance observer compares at a sample."""
-
-    inertia: Expression  # J in kg·m²
-    torque_per_current: Expression  # k in N·m/A
-    raw_speed: Expression  # difference of the measured angle over the last sample, in rad/s
-    load: Expression  # torque that the motor is known to work against, in N·m: spring and friction
-
-
 @dataclass(frozen=True)
 class DisturbanceObserver:
     """Disturbance torque d̂ = Q(s)·(J·s·ω − k·I + r·T̂ + friction); the motor is given its opposite.
@@ -56,21 +47,33 @@ class DisturbanceObserver:
         if not (isinstance(self.delay, int) and 0 <= self.delay <= 20):
             raise ValueRangeError(f"delay {self.delay}", "must be a whole number of samples from 0 to 20")
 
-    def torque(self, writer: LawWriter, balance: MotorBalance) -> Expression:
+    def torque(
+        self,
+        writer: LawWriter,
+        *,
+        inertia: Expression,
+        torque_per_current: Expression,
+        raw_speed: Expression,
+        load: Expression,
+    ) -> Expression:
         """Return d̂, the torque in N·m that accelerates the motor beyond what is known.
 
         Parameters
         ----------
         writer
             Of the controller.
-        balance
-            Of the motor.
+        inertia, torque_per_current
+            Of the motor: J in kg·m² and k in N·m/A.
+        raw_speed
+            Difference of the measured angle over the last sample, in rad/s.
+        load
+            Torque that the motor is known to work against, in N·m: spring and friction.
         """
         corner = writer.setting(
             "disturbance_bandwidth", "Hz", "disturbance observer: corner of its filter", self.bandwidth
         )
         speed = writer.state("disturbance_observer.speed.previous", "rad/s", "speed over the sample before")
-        load = writer.state("disturbance_observer.load.previous", "N*m", "known load one sample ago")
+        load_before = writer.state("disturbance_observer.load.previous", "N*m", "known load one sample ago")
         estimate = writer.state("disturbance_observer.torque", "N*m", "estimated disturbance torque")
         # currents[i] was computed i + 1 samples ago and acted from i + 1 − delay samples ago on.
         currents = [
@@ -79,15 +82,11 @@ class DisturbanceObserver:
         ]
         # The difference of two mean speeds is the mean acceleration of both samples, each counted half.
         acting = (currents[self.delay] + currents[self.delay + 1]) / 2
-        apart = (
-            balance.inertia * (balance.raw_speed - speed) / writer.sample_time
-            - balance.torque_per_current * acting
-            + load
-        )
+        apart = inertia * (raw_speed - speed) / writer.sample_time - torque_per_current * acting + load_before
         disturbance = writer.low_pass(estimate, apart, corner)
-        writer.follow("disturbance_observer.speed.previous", balance.raw_speed)
-        writer.begin("disturbance_observer.load.previous", balance.load)
-        writer.follow("disturbance_observer.load.previous", balance.load)
+        writer.follow("disturbance_observer.speed.previous", raw_speed)
+        writer.begin("disturbance_observer.load.previous", load)
+        writer.follow("disturbance_observer.load.previous", load)
         writer.follow("disturbance_observer.torque", disturbance)
         for i in range(2, self.delay + 3):
             writer.follow(_current(i), currents[i - 2])
@@ -269,7 +268,9 @@ class VelocityLoop:
                 if self.friction is None
                 else load + self.friction.torque(writer, drive, heard, speed, gain=stiffness)
             )
-            torque -= self.disturbance.torque(writer, MotorBalance(inertia, constant, raw, resisting))
+            torque -= self.disturbance.torque(
+                writer, inertia=inertia, torque_per_current=constant, raw_speed=raw, load=resisting
+            )
         wanted = current_for(drive, writer, torque)
         current = self._limited(writer, drive, wanted, speed)
         if self.disturbance is not None:
