@@ -18,7 +18,8 @@ from ...design import CamDesign, Contour, elastic_law
 from ...design.statics.contour import RollerContour, RollingContour, cable_up_to, turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import MM, typeset_number
+from ...foundation.quantity import MM, three_digits, typeset_number
+from ...foundation.written_numbers import prefixed
 from ...model import FlatModel
 from .style import (
     BLUE,
@@ -393,15 +394,26 @@ def draw_rolling(axes: Axes, design: CamDesign, contour: RollingContour, angle: 
     end = MM * _reach(contour)
     axes.plot([0.0, 0.0], [0.0, end], color=INK.light, linewidth=0.8, linestyle=(0, (8, 2, 1, 2)))
     axes.plot([0, centre[0]], [0, centre[1]], "o", color=INK.light, markersize=4)
-    curves, check = design.curves, design.check
-    numbers = (
-        f"arm {MM * float(np.interp(angle, contour.angles, contour.lever_arms)):.1f} mm",
-        f"{float(np.interp(angle, curves.angles, curves.forces)):.0f} N",
-        f"{float(np.interp(angle, check.angles, check.torques)):.3g} N·m",
-    )
-    axes.set_title(f"{np.degrees(angle):.0f}°: {', '.join(numbers)}", fontsize=8.5)
+    axes.set_title(numbers_at(design, angle), fontsize=8.5)
     axes.set_aspect("equal")
     axes.grid(visible=False)
+
+
+def numbers_at(design: CamDesign, angle: float) -> str:
+    """Return lever arm, force and torque at an angle in rad as text, and the torque beyond a jump."""
+    contour, curves, check = design.contour, design.curves, design.check
+    arm, force, torque = (
+        float(np.interp(angle, at, values))
+        for at, values in (
+            (contour.angles, contour.lever_arms),
+            (curves.angles, curves.forces),
+            (check.angles, check.torques),
+        )
+    )
+    beyond = float(check.torques[1])
+    jump = torque == 0.0 and abs(arm * force) > 0.3 * abs(beyond) > 0.0
+    words = f"{prefixed(torque)}{f', beyond it {prefixed(beyond)}' if jump else ''}"
+    return f"{np.degrees(angle):.0f}°: arm {MM * arm:.1f} mm, {three_digits(force)} N, {words}"
 
 
 def _rolls(contour: RollingContour, angle: float) -> tuple[Array, ...]:
