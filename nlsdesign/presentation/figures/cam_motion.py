@@ -18,7 +18,7 @@ from ...design import CamDesign, Contour, elastic_law
 from ...design.statics.contour import RollerContour, RollingContour, cable_up_to, turn
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
-from ...foundation.quantity import MM, three_digits, typeset_number
+from ...foundation.quantity import MM, typeset_number
 from ...foundation.written_numbers import prefixed
 from ...model import FlatModel
 from .style import (
@@ -400,20 +400,15 @@ def draw_rolling(axes: Axes, design: CamDesign, contour: RollingContour, angle: 
 
 
 def numbers_at(design: CamDesign, angle: float) -> str:
-    """Return lever arm, force and torque at an angle in rad as text, and the torque beyond a jump."""
+    """Return lever arm, force and torque at an angle in rad as text."""
     contour, curves, check = design.contour, design.curves, design.check
-    arm, force, torque = (
-        float(np.interp(angle, at, values))
-        for at, values in (
-            (contour.angles, contour.lever_arms),
-            (curves.angles, curves.forces),
-            (check.angles, check.torques),
-        )
-    )
-    beyond = float(check.torques[1])
-    jump = torque == 0.0 and abs(arm * force) > 0.3 * abs(beyond) > 0.0
-    words = f"{prefixed(torque)}{f', beyond it {prefixed(beyond)}' if jump else ''}"
-    return f"{np.degrees(angle):.0f}°: arm {MM * arm:.1f} mm, {three_digits(force)} N, {words}"
+    arm = float(np.interp(angle, contour.angles, contour.lever_arms))
+    force = float(np.interp(angle, curves.angles, curves.forces))
+    torque = float(np.interp(angle, check.angles, check.torques))
+    # Where the torque jumps, or begins within an onset, zero would contradict arm and force.
+    begins = torque == 0.0 and abs(arm * force) > 1e-3 * design.target.largest
+    words = "torque begins here" if begins else prefixed(torque)
+    return f"{np.degrees(angle):.0f}°: arm {MM * arm:.1f} mm, {prefixed(force, 'N')}, {words}"
 
 
 def _rolls(contour: RollingContour, angle: float) -> tuple[Array, ...]:

@@ -39,7 +39,7 @@ _COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 _REFERENCE = re.compile(r"#([\w-]+)")
 _FONT = re.compile(r"font-family:[^;]*; ")
 """The page gives the letters of its figures the font of its text."""
-_STRAIGHT = re.compile(r"([MLz])(?: (\S+) (\S+))?")
+_STRAIGHT = re.compile(r"([ML]) (\S+) (\S+)|z")
 _HASHED = re.compile(r'(?<=id=")([A-Za-z])[0-9a-f]{10}(?=")|(?<=#)([A-Za-z])[0-9a-f]{10}\b')
 """Identifiers that matplotlib makes of coordinates, whose last digits differ from processor to processor."""
 _MARKS = (f"{_SVG}use", f"{_SVG}path")
@@ -221,7 +221,7 @@ def _steps(path: str) -> str:
     """Return a path of straight lines as steps from point to point, which take half the letters."""
     text, at = "", (0, 0)
     for letter, *place in _STRAIGHT.findall(path):
-        if letter == "z":
+        if not letter:
             text += "z"
             continue
         x, y = (round(10 * float(number)) for number in place)

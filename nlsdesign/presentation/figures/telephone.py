@@ -56,7 +56,8 @@ def _wrap_names(axis: Axis) -> int:
 
 def _wrap_words(axes: Axes) -> None:
     """Break title and labels of a panel into lines, and put its legend into as many columns as fit."""
-    axes.set_title(fill(axes.get_title(loc="left"), _TITLE))
+    axes.set(xlabel=fill(axes.get_xlabel(), 56), ylabel=fill(axes.get_ylabel(), 28))
+    axes.set_title(fill(axes.get_title(loc="left"), _TITLE if axes.get_aspect() == "auto" else 28))
     handles, labels = axes.get_legend_handles_labels()
     if axes.get_legend() is None or not handles:
         return
