@@ -29,7 +29,7 @@ help:
 	@echo 'make study      a small study, then that of the published actuator; the report goes to $(OUT)/report.html'
 	@echo '                (another one: make study STUDY=name; another folder: make study OUT=folder)'
 	@echo 'make test       style, types and all tests but the slow ones'
-	@echo 'make thorough   the slow tests too, before a release'
+	@echo 'make thorough   the slow tests and the documentation site too, before a release'
 	@echo 'make kernels    the tests under several kernels of linear algebra: same results on every processor'
 	@echo 'make mutation   break the package in places drawn by chance and list what no test notices'
 	@echo 'make lint       style and types only'
@@ -73,7 +73,7 @@ test: lint
 		exit $$status; }
 
 # A second checker of types takes five times as long and finds next to nothing that the first one passed.
-thorough: lint
+thorough: lint docs
 	$(BIN)/mypy --strict nlsdesign models studies
 	$(BIN)/python -m pytest -n $(WORKERS) $(SHARED_OUT)
 

@@ -26,7 +26,7 @@ symbolic.remembered = lambda count: _remembered(8 * count)  # type: ignore[misc]
 
 # The same examples in every run; no time limit (it would test the machine); nothing written to disk.
 settings.register_profile("thorough", derandomize=True, deadline=None, database=None, max_examples=300)
-settings.register_profile("quick", settings.get_profile("thorough"), max_examples=20)
+settings.register_profile("quick", settings.get_profile("thorough"), max_examples=12)
 
 
 def pytest_configure(config: pytest.Config) -> None:

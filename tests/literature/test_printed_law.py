@@ -100,7 +100,7 @@ def figure_cam_with_printed_rubber() -> Assembly:
     return declare(load_deck(PRINTED)).with_part("spring.cam", declare(load_deck(CONSISTENT))["spring.cam"])
 
 
-@pytest.mark.long_cases("0.1-0.04")
+@pytest.mark.long_cases("1.0-0.4", "0.1-0.04")
 @pytest.mark.parametrize(("frequency", "stated"), [(0.1, 0.04), (1.0, 0.4), (4.0, 1.5), (9.0, 3.3)])
 def test_loss_per_cycle_with_the_printed_viscosity(frequency: float, stated: float) -> None:
     """Energy lost over energy put in, 45° amplitude, printed rubber behind the cam of Fig. 8.

@@ -93,7 +93,7 @@ def _signal(model: FlatModel, state: Array, u: list[float], name: str) -> float:
     return float(np.array(values).ravel()[[v.name for v in model.signals].index(name)])
 
 
-@pytest.mark.long_cases("austin2015_as_printed-411000.0-form0")
+@pytest.mark.long_cases("austin2015_figure_consistent-31000.0-form0", "austin2015_as_printed-411000.0-form0")
 @pytest.mark.parametrize("form", [Minimal(), pytest.param(PaperForm(), marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("deck", "viscosity"),

@@ -80,7 +80,8 @@ def test_stiffening_rubber_is_not_taken_for_another_rig(tmp_path: Path) -> None:
     assert names(found) == ["strain_stiffening"]
 
 
-@pytest.mark.parametrize("only", [THREE_RECORDS, pytest.param(RECORDS, marks=pytest.mark.slow)], ids=len)
+@pytest.mark.slow
+@pytest.mark.parametrize("only", [THREE_RECORDS, RECORDS], ids=len)
 def test_nothing_is_invented_on_a_clean_set(tmp_path: Path, only: Sequence[str]) -> None:
     found = diagnose(*rig_set(tmp_path, "wrist", {}, 78, only=only))
     assert found.verdict == "none"

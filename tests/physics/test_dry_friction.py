@@ -256,6 +256,7 @@ def test_a_stack_of_sticking_inertias() -> None:
 # --- power ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("rub2-<lambda>")
 @pytest.mark.parametrize(
     ("rub", "level"),
     [

@@ -63,6 +63,7 @@ def test_a_count_that_is_read_wrongly_is_noticed(other, tmp_path):
     assert 0 <= run.first < 100
 
 
+@pytest.mark.slow
 def test_a_fault_of_the_processor_and_a_restart_are_counted(other, tmp_path):
     text = (BOARD / "board.h").read_text()
     assert text.count("    static uint32_t last_frame;") == 1

@@ -35,6 +35,7 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> dict[tuple[str, str], tupl
     return units(tmp_path_factory.mktemp("masters"))
 
 
+@pytest.mark.long_cases("fmpy-plant-2.0")
 @pytest.mark.parametrize(
     ("master", "name", "version"), [*QUICK, *[pytest.param(*each, marks=pytest.mark.slow) for each in REST]]
 )

@@ -150,6 +150,7 @@ def test_the_arcs_keep_the_stated_distance_from_the_offset_of_the_integrated_cur
 
 
 @pytest.mark.long_cases(
+    "two-sided, anchor 40 mm, bolts, ferrule",
     "one-sided, anchor 30 mm",
     "two-sided, anchor 25 mm",
     "two-sided, groove and bore",

@@ -131,6 +131,7 @@ def test_the_fuzz_would_notice(tmp_path: Path) -> None:
     assert fuzzed(cascade(), tmp_path, wait=0.2)[2] > 0.01
 
 
+@pytest.mark.long_cases("double-5e+306")
 @pytest.mark.parametrize(("real", "huge"), [("float", 7.1e36), ("float", 1.15e37), ("double", 5e306)])
 def test_a_huge_sample_does_not_lock_an_observer_without_any_range(
     real: str, huge: float, tmp_path: Path

@@ -38,6 +38,7 @@ def one_by_one(model: FlatModel, times: np.ndarray, columns: dict[str, np.ndarra
             assert np.max(np.abs(batch[name][i] - alone[name])) <= 10 * TOLERANCE * size, (i, name)
 
 
+@pytest.mark.long_cases("1")
 @pytest.mark.parametrize("least", [1, 1000])
 def test_the_published_actuator_with_corners_in_its_rubber(
     monkeypatch: pytest.MonkeyPatch, least: int

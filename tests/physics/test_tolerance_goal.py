@@ -87,7 +87,13 @@ def drawn_quantile(
 
 
 @pytest.mark.long_cases(
-    "trimmed-0.5", "trimmed-0.9", "trimmed-0.99", "as built-0.5", "as built-0.9", "as built-0.95"
+    "trimmed-0.95",
+    "trimmed-0.5",
+    "trimmed-0.9",
+    "trimmed-0.99",
+    "as built-0.5",
+    "as built-0.9",
+    "as built-0.95",
 )
 @pytest.mark.parametrize("share", [0.5, 0.9, 0.95, 0.99])
 @pytest.mark.parametrize("trims", [None, ()], ids=["trimmed", "as built"])
@@ -114,7 +120,7 @@ def test_ranges_have_a_lower_tail() -> None:
     assert bounded < 0.7 * goal_in_newton_metres(ToleranceQuantile(rules=RULES, trims=()), target)
 
 
-@pytest.mark.long_cases("set-trimmed", "creep-trimmed")
+@pytest.mark.long_cases("set-as built", "set-trimmed", "creep-trimmed")
 @pytest.mark.parametrize("trims", [None, ()], ids=["trimmed", "as built"])
 @pytest.mark.parametrize("takes", [{"share": 0.3}, {"time": 600.0}], ids=["set", "creep"])
 def test_what_time_takes_is_counted(takes: dict[str, float], trims: tuple[str, ...] | None) -> None:

@@ -29,6 +29,7 @@ def watched(request, tmp_path_factory):
     return plan, build_watched(request.param, export_watch(plan, folder / "c", real="float")), folder
 
 
+@pytest.mark.long_cases("joint-20")
 @pytest.mark.parametrize("minutes", [20, pytest.param(30, marks=pytest.mark.slow)])
 def test_time_without_a_change_is_quiet_and_reads_as_none(watched, minutes):
     plan, program, folder = watched
@@ -50,6 +51,7 @@ def test_a_change_is_noticed_within_a_minute_and_named_after_five(watched, what)
     assert AT_ONCE[what] in (named.name, *named.aliases)
 
 
+@pytest.mark.long_cases("joint")
 def test_a_machine_that_is_not_quite_its_deck_is_held_against_itself(watched):
     _, program, _ = watched
     built = {"friction": 1.25, "stiffness": 1.03, "inertia": 0.97}

@@ -221,6 +221,8 @@ RACK_CARRIAGE = replace(
     limit=10.0,
     logger=Logger(quantum=1e-6, load_quantum=1e-6, current_noise=0.01),
     coarse=2e-5,
+    # A scale has no disc that could sit off its shaft.
+    effects=tuple(effect for effect in BELT_AXIS.effects if effect != "joint_eccentricity"),
 )  # fmt: skip
 _IN_MUJOCO = (
     "coulomb_friction", "viscous_friction", "gravity_load", "torque_ripple", "drive_delay",

@@ -29,6 +29,7 @@ def test_a_target_is_met_at_once_or_after_the_first_advice(line: Line) -> None:
     assert line.verdict != "not met", line
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("austin2015_figure_consistent-4")
 def test_a_miss_says_so_and_what_to_do(line: Line) -> None:
     assert line.first.error is not None

@@ -134,6 +134,7 @@ def numbers_in(text: str) -> list[str]:
     return re.findall(r"(?<![\w.])-?\d+\.?\d*(?:e[-+]?\d+)?f?(?![\w.])", text)
 
 
+@pytest.mark.slow
 @ONE
 def test_export_c(run: Run, tmp_path: Path, scheme: Scheme) -> None:
     machine = renamed(published(), scheme)

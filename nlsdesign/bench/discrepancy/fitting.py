@@ -56,6 +56,8 @@ class Tally(NamedTuple):
     # segments: sum of squares where the numbers come from the other records, one for each piece of the record
     # in time. Empty where no record was left out.
     segments: tuple[float, ...] = ()
+    # in_common: sum of squares with the numbers of all records, and what these cost the others
+    in_common: float = 0.0
 
     @property
     def predicted(self) -> float:

@@ -57,7 +57,7 @@ def test_all_commands_write_what_errs_least_over_the_spread(run: Run, tmp_path: 
     assert "not certified" in head
 
 
-@pytest.mark.long_cases("published", "kalman")
+@pytest.mark.long_cases("certified", "published", "kalman")
 @pytest.mark.parametrize("kind", [kind for kind in KINDS if kind not in ("best", "corrected")])
 def test_every_kind_is_written(run: Run, tmp_path: Path, kind: str) -> None:
     deck = "austin2015_figure_consistent" if kind == "published" else DECK  # its states need a cam

@@ -111,7 +111,7 @@ def test_float_agrees_with_double_as_far_as_its_rounding_allows(name, running):
     assert np.all(difference < 3e-5)
 
 
-@pytest.mark.long_cases("observer-double", "controller-float")
+@pytest.mark.long_cases("controller-double", "observer-double", "controller-float")
 @pytest.mark.parametrize("real", REALS)
 @pytest.mark.parametrize("name", MODELS)
 def test_the_self_test_passes_and_can_fail(name, real, tmp_path):
@@ -127,7 +127,7 @@ def test_the_self_test_passes_and_can_fail(name, real, tmp_path):
     assert subprocess.run([wrong], check=False, capture_output=True).returncode != 0
 
 
-@pytest.mark.long_cases("double--O0", "double--O2", "float--O0", "float--O3")
+@pytest.mark.long_cases("double--O3", "double--O0", "double--O2", "float--O0", "float--O3")
 @pytest.mark.parametrize("optimised", ["-O0", "-O2", "-O3"])
 @pytest.mark.parametrize("real", REALS)
 def test_gcc_finds_nothing_to_complain_about(real, optimised, tmp_path):

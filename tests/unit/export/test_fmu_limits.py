@@ -182,7 +182,7 @@ def by_differences(start: float, count: int) -> list[tuple[float, float]]:
 CLOCKS = pytest.mark.parametrize("clock", [by_adding, by_multiplying, by_differences])
 
 
-@pytest.mark.long_cases("by_adding-3.0", "by_multiplying-2.0", "by_differences-3.0")
+@pytest.mark.long_cases("by_adding-2.0", "by_adding-3.0", "by_multiplying-2.0", "by_differences-3.0")
 @both
 @CLOCKS
 def test_samples_are_counted_at_a_large_time(clock, version, units):

@@ -70,6 +70,7 @@ def worst_deviation(fmu: Path, model: FlatModel) -> float:
 QUICK = {("plant", "3.0"), ("observer", "2.0")}
 
 
+@pytest.mark.long_cases("plant-3.0")
 @pytest.mark.parametrize(
     ("name", "version"),
     [

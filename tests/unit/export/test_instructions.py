@@ -77,6 +77,7 @@ def compiled(expressions: list[ca.SX], real: Real, folder) -> ctypes.CDLL:
     return ctypes.CDLL(str(library))
 
 
+@pytest.mark.long_cases("float")
 @pytest.mark.parametrize(
     ("real", "tolerance"), [(Real.DOUBLE, 2e-14), (Real.FLOAT, 3e-5)], ids=["double", "float"]
 )

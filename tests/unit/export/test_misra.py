@@ -12,7 +12,7 @@ from tests.hand_built import controller, observer
 needs_cppcheck = pytest.mark.skipif(misra.cppcheck() is None, reason="cppcheck is not installed")
 
 
-@pytest.mark.long_cases("controller-double", "observer-float")
+@pytest.mark.long_cases("observer-double", "controller-double", "observer-float")
 @needs_cppcheck
 @pytest.mark.parametrize("real", ["float", "double"])
 @pytest.mark.parametrize("model", [observer(), controller()], ids=["observer", "controller"])

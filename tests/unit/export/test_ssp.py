@@ -60,7 +60,7 @@ def desired(time: float) -> float:
     return 0.5 * math.sin(6.0 * time)
 
 
-@pytest.mark.long_cases("3.0-1.0")
+@pytest.mark.long_cases("2.0-1.0", "3.0-1.0")
 @pytest.mark.parametrize("version", ["1.0", "2.0"])
 def test_what_is_written_is_read_and_run_as_the_same_system(
     version: str, fmus: dict[str, Path], tmp_path: Path

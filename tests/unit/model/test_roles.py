@@ -238,6 +238,7 @@ def test_a_machine_passes_or_one_sentence_says_why(
         assert sorted(tmp_path.rglob("*")) == before, "nothing half-written"
 
 
+@pytest.mark.long_cases("one_sided_cable_drive")
 @pytest.mark.parametrize("deck", MACHINES)
 def test_every_machine_is_shown_and_simulated(run: Run, decks: dict[str, str], deck: str) -> None:
     assert run("deck", "check", decks[deck])[0] == 0

@@ -50,6 +50,7 @@ def drawn(name: str) -> figures.Figure:
 # --- every figure ---------------------------------------------------------------------------------
 
 
+@pytest.mark.long_cases("motor_over_task")
 @pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::15]))
 def test_a_figure_is_drawn_the_same_whatever_the_user_has_set(name: str) -> None:
     first = svg_text(drawn(name))

@@ -31,7 +31,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
-from .measures import DECLARED, Excess, Excesses, Gain, Standing, explained, gain, total_excess
+from .measures import DECLARED, Excess, Excesses, Gain, Standing, common_gains, explained, gain, total_excess
 
 
 def _criterion(default: float, meaning: str) -> Any:
@@ -185,11 +185,16 @@ class Change:
     def predicts_records(self) -> bool:
         """Whether whole records are predicted better, where each is judged by the numbers of the others.
 
-        Nothing is asked where only declared numbers are open.
+        Nothing is asked where only declared numbers are open. A record may depend so sharply on the numbers
+        that those of the others never predict it. Then the numbers of all records are judged, at what they
+        cost the others; that gain must not rest on the record that gains most: the others need not know it.
         """
         if not any(one.open for name, one in self.before.items() if name != DECLARED):
             return True
-        return self.gain.value >= self.criteria.noise_margin
+        if self.gain.value >= self.criteria.noise_margin:
+            return True
+        gains = common_gains(self.before, self.after)
+        return math.fsum(gains) - max(gains, default=0.0) >= self.criteria.noise_margin
 
     def records_made_worse(self) -> dict[str, float]:
         """Return the records that are predicted worse, with the factor by which their squares grow.

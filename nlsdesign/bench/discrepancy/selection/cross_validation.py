@@ -9,7 +9,11 @@ predicted with those numbers, exactly.
 
 By pieces hypotheses are compared. Leaving whole records out asks more: of six motions of six kinds five may
 not identify what the sixth shows, so it would choose the models that leave that out. But an effect that does
-not predict whole records at all describes the records it was fitted to and nothing else.
+not predict whole records at all describes the records it was fitted to and nothing else. Where a record
+depends sharply on the numbers, such as one that rings in a resonance, those of the others never predict it,
+right as they are. Whole records are therefore judged in a second way too: with the numbers of all records,
+at the price of the squares that these cost the others. That is the least of both together, so what the
+numbers of the others leave open is no objection, and what they contradict is.
 """
 
 from __future__ import annotations
@@ -97,16 +101,18 @@ def tallies_of(
     x = np.array([p.inward(best.values[p.name]) for p in best.parameters])
     pieces = _pieces(rows, evidence, x, folds)
     predicted = [piece.residual for piece in pieces]
+    in_common = [float(piece.residual @ piece.residual) for piece in pieces]
     if folds is not None and len(x):
-        predicted = _predicted(rows, pieces, x, exact=exact)
+        predicted, in_common = _predicted(rows, pieces, x, exact=exact)
     return {
         (p.evidence.driven.block.name, p.evidence.record.name): Tally(
             float(p.residual @ p.residual),
             len(p.residual),
             min(effective_size(p.residual), p.evidence.floor.independent),
             tuple(float(s @ s) for s in np.array_split(beside, SEGMENTS)),
+            common,
         )
-        for p, beside in zip(pieces, predicted, strict=True)
+        for p, beside, common in zip(pieces, predicted, in_common, strict=True)
     }
 
 
@@ -115,9 +121,15 @@ def _pieces(rows: StackedRows, evidence: Sequence[Evidence], x: Array, folds: Fo
     return [_Piece(each, *rows.of(each, x), fold) for each, fold in zip(evidence, numbers, strict=True)]
 
 
-def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: bool) -> list[Array]:
-    """Return the residual of every piece, each fold predicted with the numbers that the other folds give."""
+def _predicted(
+    rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: bool
+) -> tuple[list[Array], list[float]]:
+    """Return the residual of every piece, each fold predicted with the numbers that the other folds give.
+
+    Beside them its squares with the numbers of all folds, and what these cost the other folds.
+    """
     predicted = [piece.residual.copy() for piece in pieces]
+    in_common = [float(piece.residual @ piece.residual) for piece in pieces]
     folds = sorted({int(k) for piece in pieces for k in np.unique(piece.fold) if k >= 0})
     used = [piece for piece in pieces if piece.evidence.record.role == "fit"]
     whole = rows.prior_information + sum((p.slope.T @ p.slope for p in used), np.zeros((len(x), len(x))))
@@ -128,9 +140,12 @@ def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: 
         information = whole - sum((s.T @ s for s, _ in own), np.zeros_like(whole))
         pull = sum((s.T @ r for s, r in own), np.zeros(len(x)))
         moved = _without(information, pull, gradient, (x, *box(rows.parameters)[:2]))
-        moved = others.descended(moved) if exact else moved
+        moved, price = others.descended(moved) if exact else (moved, 0.0)
+        inside = sum(float(r @ r) for _, r in own)
         for place, piece in enumerate(pieces):
             mask = piece.fold == fold
+            squares = float(piece.residual[mask] @ piece.residual[mask])
+            in_common[place] += price * squares / max(inside, 1e-300)
             if mask.any():
                 linear: Array = piece.residual + piece.slope @ (moved - x)
                 predicted[place][mask] = linear[mask]
@@ -138,7 +153,7 @@ def _predicted(rows: StackedRows, pieces: Sequence[_Piece], x: Array, *, exact: 
                     with suppress(ConvergenceError):
                         # Without a response there, what the linearised problem says is all that is known.
                         predicted[place][mask] = others.left(piece.evidence, moved)[mask]
-    return predicted
+    return predicted, in_common
 
 
 class _Others:
@@ -148,23 +163,28 @@ class _Others:
         self._rows, self._used, self._fold, self._x = rows, used, fold, x
         self._last: tuple[bytes, dict[int, Array]] = (b"", {})
 
-    def descended(self, moved: Array) -> Array:
+    def descended(self, moved: Array) -> tuple[Array, float]:
         """Return numbers that one step has given, or those of a descent where the step is none.
+
+        Beside them what the others gain by them, in squares: the price of the numbers of all records.
 
         The numbers of all records are open to a fit without the fold too. A step that does not bring it
         half of what its slopes promise has left the place where they hold: along what the others hardly
         know, it may lead anywhere, and it would be blamed on the effect.
         """
-        try:
-            before, slope = self(self._x)
-            cost, linear = before @ before, before + slope @ (moved - self._x)
-            promised = 0.5 * float(cost - linear @ linear)
-            if promised < ENOUGH or 0.5 * float(cost) - self._cost(moved) >= _KEPT * promised:
-                return moved
-        except ConvergenceError:
-            pass  # the step leads to where there is no response, so it is none
+        before, slope = self(self._x)
+        cost = float(before @ before)
+        linear = before + slope @ (moved - self._x)
+        promised = 0.5 * (cost - float(linear @ linear))
+        if promised < ENOUGH:
+            return moved, 0.0
+        with suppress(ConvergenceError):  # a step that leads to where there is no response is none
+            gained = cost - 2.0 * self._cost(moved)
+            if gained >= 2.0 * _KEPT * promised:
+                return moved, gained
         low, high, _ = box(self._rows.parameters)
-        return minimise(self, self._x, (low, high), evaluations=_EVALUATIONS, share=_TOLERANCE).x
+        moved = minimise(self, self._x, (low, high), evaluations=_EVALUATIONS, share=_TOLERANCE).x
+        return moved, max(cost - 2.0 * self._cost(moved), 0.0)
 
     def left(self, each: Evidence, x: Array) -> Array:
         """Return residuals of one record; those at the last numbers are remembered."""

@@ -138,4 +138,5 @@ def _block_excess(hypothesis: Hypothesis, bench: Bench, block: str, criteria: Cr
         is_open(predicted, rows, effective),
         {record: t.segments or (t.squares,) for record, t in tallies.items()},
         frozenset(r for r, t in tallies.items() if not is_open(t.predicted, t.rows, t.effective_size)),
+        {record: t.in_common for record, t in tallies.items()},
     )

@@ -38,6 +38,8 @@ class Excess:
     # pieces: the sum of squares by record, for each piece of the record in time
     pieces: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     closed_on: frozenset[str] = frozenset()  # records on which, each taken alone, it is no more than noise
+    # in_common: by record, the squares with the numbers of all records and what these cost the other records
+    in_common: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def excess(self) -> float:
@@ -140,6 +142,16 @@ def gains_by_record(before: Excesses, after: Excesses) -> dict[str, float]:
             gained = sum(pieces) - sum(after[name].pieces[record])
             gains[record] = gains.get(record, 0.0) + gained / max(one.colour, after[name].colour)
     return gains
+
+
+def common_gains(before: Excesses, after: Excesses) -> list[float]:
+    """Return the gain of each record with the numbers of all, less what these cost the other records."""
+    gains: dict[str, float] = {}
+    for name, one in before.items():
+        for record, squares in one.in_common.items():
+            gained = (squares - after[name].in_common[record]) / max(one.colour, after[name].colour)
+            gains[record] = gains.get(record, 0.0) + gained
+    return list(gains.values())
 
 
 _CLOSE = 0.005

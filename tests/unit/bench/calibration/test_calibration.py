@@ -141,7 +141,9 @@ def test_friction_turns_at_once_on_the_bench() -> None:
     assert rub is not None
 
 
-@pytest.mark.long_cases("kind0-one_sided_cable_drive", "kind1-one_sided_cable_drive")
+@pytest.mark.long_cases(
+    "kind0-austin2015_figure_consistent", "kind0-one_sided_cable_drive", "kind1-one_sided_cable_drive"
+)
 @pytest.mark.parametrize("name", [CAM, "test_rig", "one_sided_cable_drive"])
 @pytest.mark.parametrize("kind", [HungWeightTest(), LoadCellTest()])
 def test_slopes_are_those_of_differences(name: str, kind: CalibrationTest) -> None:

@@ -245,6 +245,21 @@ def test_a_record_that_is_still_predicted_to_within_its_noise_in_every_block_is_
 # --- when the search is done ----------------------------------------------------------------------
 
 
+@pytest.mark.parametrize(
+    ("gains", "allowed"),
+    [((200.0, 200.0), True), ((1e4, 20.0), False), ((1e4, 30.0), True), ((1e4, -200.0), False)],
+)
+def test_what_no_other_record_predicts_is_judged_by_numbers_in_common_and_never_by_one_record(
+    gains: tuple[float, ...], allowed: bool
+) -> None:
+    before = {"spring": replace(excess(2e5), in_common=dict.fromkeys(RECORDS, 1e5))}
+    left = {name: 1e5 - gained for name, gained in zip(RECORDS, gains, strict=True)}
+    after = {"spring": replace(excess(3e5), in_common=left)}
+    assert Change(RULE, before, after).predicts_records is allowed
+    better = {"spring": replace(excess(1e5), in_common=left)}
+    assert Change(RULE, before, better).predicts_records, "whole records are predicted: nothing more is asked"
+
+
 def test_a_block_counts_as_explained_when_closed_or_by_three_quarters() -> None:
     def last(left: float, *, is_open: bool = True) -> dict[str, Excess]:
         return {"spring": excess(left, is_open=is_open)}

@@ -143,6 +143,17 @@ def test_a_whole_record_is_predicted_with_the_numbers_of_the_other_records(
         numbers = solved(np.vstack([SLOPES[n] for n in others]), np.concatenate([DATA[n] for n in others]))
         left = DATA[name] - SLOPES[name] @ numbers
         assert tallies["spring", name].predicted == pytest.approx(float(left @ left))
+        # The least squares of all records together are those of the others and what this record adds to them.
+        adds = cost_of(fits, best) - cost_of(others, numbers)
+        assert tallies["spring", name].in_common == pytest.approx(adds, abs=0.05)
+        assert tallies["spring", name].squares < tallies["spring", name].in_common
+        assert tallies["spring", name].in_common < tallies["spring", name].predicted
+
+
+def cost_of(names: list[str], numbers: np.ndarray) -> float:
+    """Sum of squares over some records with the prior on the first number, written out."""
+    left = [DATA[name] - SLOPES[name] @ numbers for name in names]
+    return float(np.sum(np.concatenate(left) ** 2) + ((numbers[0] - 1.0) / PRIOR) ** 2)
 
 
 def test_of_two_records_none_is_left_out_as_a_whole() -> None:

@@ -1,4 +1,4 @@
-"""Machines of the rig with a fault of an encoder, and a strip that is slack: the right place is told."""
+"""Machines of the rig with a fault of an encoder, a resonance, a slack strip: the right name and place."""
 
 from __future__ import annotations
 
@@ -46,6 +46,15 @@ def test_an_eccentric_disc_shows_in_the_balance_of_a_direct_drive(tmp_path: Path
     rivals = effects.angle_sensor_eccentricity, effects.torque_ripple
     verdict = diagnosed(tmp_path, "direct_drive", "angle_sensor_eccentricity", 1195, "coarse", *rivals)
     assert [effect.name for effect in verdict.effects] == ["angle_sensor_eccentricity"]
+    assert verdict.complete
+
+
+@pytest.mark.slow
+def test_a_resonance_is_told_although_one_record_rings_out_of_step(tmp_path: Path) -> None:
+    """The numbers of the other records, right within 5 %, predict the record of steps worse than none."""
+    rivals = effects.drivetrain_resonance, effects.torque_ripple
+    verdict = diagnosed(tmp_path, "direct_drive", "drivetrain_resonance", 1311, "plain", *rivals)
+    assert [effect.name for effect in verdict.effects] == ["drivetrain_resonance"]
     assert verdict.complete
 
 

@@ -102,6 +102,7 @@ def estimated_over_true(parts: list[NoisePart], duration: float, lag: int, seed:
     )
 
 
+@pytest.mark.long_cases("1000")
 @pytest.mark.parametrize("lag", [0, 1000])
 def test_noise_that_rises_to_the_lowest_frequency_seen_is_taken_to_rise_on(lag: int) -> None:
     to_the_end = np.median([estimated_over_true(FLICKER, DURATION, lag, seed) for seed in range(12)])

@@ -26,6 +26,7 @@ def masked(place: int) -> Record:
     return replace(whole, masked={FORCE: mask})
 
 
+@pytest.mark.long_cases("False")
 @pytest.mark.parametrize("coarse", [False, True])
 def test_no_residual_that_touches_a_masked_sample_counts(coarse: bool) -> None:
     """A force that is five times its noise off at a masked sample changes no residual."""

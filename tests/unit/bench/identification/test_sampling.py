@@ -262,6 +262,7 @@ def test_a_held_current_that_acts_half_a_sample_late_is_read_so(tmp_path: Path) 
     assert told["ammeter"].late == pytest.approx(1.05, abs=0.03)
 
 
+@pytest.mark.long_cases("None")
 @pytest.mark.parametrize("declared", [None, "held"])
 def test_a_hold_behind_which_something_lags_is_read_as_late_as_it_is(
     tmp_path: Path, declared: str | None
