@@ -176,12 +176,9 @@ def _both_sides(
     files = [*write_sides(both, out, machined=machined_cam(both.front, job) if both.met else None)]
     sides = {"front": both.front, "back": both.back}
     chosen = f"what both sides share was chosen by the {both.chosen_by}"
-    files += [
-        write_design_report(
-            out / f"{name}.html", side, deck=deck, remarks=(f"the {name} of the cam: {chosen}",)
-        )
-        for name, side in sides.items()
-    ]
+    for name, side in sides.items():
+        remarks = [f"the {name} of the cam: {chosen}"]
+        files.append(write_design_report(out / f"{name}.html", side, deck=deck, remarks=remarks))
     if as_json:
         numbers = {name: design_summary(side) for name, side in sides.items()}
         show_json({**numbers, "chosen_by": both.chosen_by, "files": files})

@@ -24,9 +24,9 @@ def for_telephone(figure: Figure) -> Figure:
     """Return a copy of a figure for a narrow screen; the given one stays as it is."""
     narrow = copy.deepcopy(figure)
     wide, height = figure.get_size_inches()
-    specs = {axes: axes.get_subplotspec() for axes in narrow.axes}
-    panels = [axes for axes, spec in specs.items() if spec is not None]
-    columns = max((spec.get_gridspec().ncols for spec in specs.values() if spec is not None), default=1)
+    specs = [(each, each.get_subplotspec()) for each in narrow.axes if each.get_visible()]
+    panels = [axes for axes, spec in specs if spec]
+    columns = max((spec.get_gridspec().ncols for _, spec in specs if spec), default=1)
     if columns > 1:
         grid = narrow.add_gridspec(len(panels), 1)
         for axes, spec in zip(panels, grid, strict=True):
@@ -36,7 +36,7 @@ def for_telephone(figure: Figure) -> Figure:
     if any(axes.get_aspect() != "auto" for axes in panels):
         words = 0.4 + 0.4 * len(panels)  # titles and numbers at the axes stay as high as they are
         height = words + (height - words) * WIDTH / wide
-    names = max(_wrap_names(axes.yaxis) for axes in panels)
+    names = max((_wrap_names(axes.yaxis) for axes in panels), default=1)
     narrow.set_size_inches(WIDTH, height * (1.0 + 0.3 * (names - 1)))
     for axes in panels:
         axes.tick_params(left=False, bottom=False)  # a tenth of the drawing, and the grid shows them

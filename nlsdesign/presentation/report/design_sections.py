@@ -12,7 +12,6 @@ import numpy as np
 
 from ...design import CamDesign, ToleranceResult
 from ...foundation.errors import NlsError
-from ...foundation.quantity import three_digits
 from ...foundation.written_numbers import prefixed
 from ...model import flatten
 from ..figures import (
@@ -147,9 +146,9 @@ def write_design_report(
         )
     facts = {"deck": f"`{deck}`", "fingerprint": f"`{design.fingerprint}`"}
     said = dict(design.rows())
-    over_spread = said.get("torque error over the spread")
-    abstract = f"Asked for: {said['target']}. The design {said['verdict']}" + (
-        f"; {over_spread}." if over_spread else "."
+    abstract = (
+        f"Asked for: {said['target']}. The design {said['verdict']}. "
+        f"Torque error over the spread: {said['torque error over the spread']}."
     )
     title = f"{Path(deck).stem}: designed spring"
     return write_report(path, *sections, title=title, abstract=abstract, facts=facts)
@@ -159,14 +158,11 @@ def _key_numbers(design: CamDesign) -> tuple[KeyNumber, ...]:
     """Return tolerance, error and loads in large letters: what can be made first."""
     share = 100.0 * design.rms / design.target.largest
     verdict = "meets its target" if design.met else "misses its target"
+    pulled = "element" if design.cam.rolling else "cable"
     numbers = [
         KeyNumber("torque error, exact numbers", f"{prefixed(design.rms)} rms", f"{share:.2g} %; {verdict}"),
         KeyNumber("largest error", prefixed(design.check.largest), "exact numbers"),
-        KeyNumber(
-            f"{'element' if design.cam.rolling else 'cable'} force",
-            f"{three_digits(float(design.curves.forces.max()))} N",
-            "largest",
-        ),
+        KeyNumber(f"{pulled} force", prefixed(float(design.curves.forces.max()), "N"), "largest"),
         KeyNumber(
             "limits reached", str(len(design.active_limits)), ", ".join(design.active_limits) or "none"
         ),
@@ -191,14 +187,7 @@ def _moved(design: CamDesign) -> list[Section]:
     except NlsError:
         return []
     caption = "The designed cam. Move the slider to turn it."
-    return [
-        CamSection(
-            f"Cam, cable and {'coil' if design.cam.coils else 'rubber'}",
-            motion,
-            caption=caption,
-            assumed="What is stretched is at rest.",
-        )
-    ]
+    return [CamSection("The cam, to turn", motion, caption=caption, assumed="What is stretched is at rest.")]
 
 
 def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
@@ -213,13 +202,11 @@ def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
     """
     behind = f", {of}" if of else ""
     curve = {"designed actuator": (design.check.angles, design.check.torques)}
-    drawn_square = bool(design.cam.specimens) and not design.cam.rolling
     return [
         FigureSection(
             f"The design to scale{behind}",
             design_picture(design),
-            caption="Above at angle zero, below at the last angle; in mm."
-            + (" The rubber is drawn as if square." if drawn_square else ""),
+            caption="Above at angle zero, below at the last angle; in mm.",
             assumed="" if design.cam.rolling else "What is stretched is at rest; cable without thickness.",
         ),
         FigureSection(
