@@ -29,8 +29,8 @@ def for_telephone(figure: Figure) -> Figure:
     columns = max((spec.get_gridspec().ncols for _, spec in specs if spec), default=1)
     if columns > 1:
         grid = narrow.add_gridspec(len(panels), 1)
-        for axes, spec in zip(panels, grid, strict=True):
-            axes.set_subplotspec(spec)
+        for row, axes in enumerate(panels):
+            axes.set_subplotspec(grid[row])
             axes.tick_params(labelleft=True, labelbottom=True)
         height *= 0.65 * columns
     if any(axes.get_aspect() != "auto" for axes in panels):

@@ -145,10 +145,10 @@ def write_design_report(
             )
         )
     facts = {"deck": f"`{deck}`", "fingerprint": f"`{design.fingerprint}`"}
-    said = dict(design.rows())
+    rows = dict(design.rows())
     abstract = (
-        f"Asked for: {said['target']}. The design {said['verdict']}. "
-        f"Torque error over the spread: {said['torque error over the spread']}."
+        f"Asked for: {rows['target']}. The design {rows['verdict']}. "
+        f"Torque error over the spread: {rows['torque error over the spread']}."
     )
     title = f"{Path(deck).stem}: designed spring"
     return write_report(path, *sections, title=title, abstract=abstract, facts=facts)
