@@ -71,14 +71,24 @@ def cycles(edges: Iterable[tuple[str, str]]) -> list[str]:
 
 def _imports_of(source: str, file: Path, known: dict[str, Path]) -> Iterator[Import]:
     package = source if file.name == "__init__.py" else source.rpartition(".")[0]
-    functions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
-    waiting = deque([(parse(file), False)])
-    while waiting:
-        node, lazy = waiting.popleft()
+    for node, lazy in _importing(parse(file)):
         for target in _targets(node, package, known):
             yield Import(source, target, getattr(node, "lineno", 0), lazy)
+
+
+@functools.lru_cache(maxsize=600)
+def _importing(tree: ast.Module) -> tuple[tuple[ast.AST, bool], ...]:
+    """Return what may import, and whether it does so inside a function; a tree is walked once."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)
+    waiting: deque[tuple[ast.AST, bool]] = deque([(tree, False)])
+    result = []
+    while waiting:
+        node, lazy = waiting.popleft()
+        if isinstance(node, ast.Import | ast.ImportFrom | ast.Call):
+            result.append((node, lazy))
         inside = lazy or isinstance(node, functions)
         waiting.extend((child, inside) for child in ast.iter_child_nodes(node))
+    return tuple(result)
 
 
 def _targets(node: ast.AST, package: str, known: dict[str, Path]) -> Iterator[str]:

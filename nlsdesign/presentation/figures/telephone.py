@@ -35,8 +35,8 @@ def for_telephone(figure: Figure) -> Figure:
     to_scale = any(axes.get_aspect() != "auto" for axes in panels)
     height *= 1.0 if columns == 1 else columns if to_scale else 0.65 * columns
     if to_scale:
-        words = 0.4 + 0.4 * len(panels)  # titles and numbers at the axes stay as high as they are
-        height = words + (height - words) * min(1.0, columns * WIDTH / wide)
+        words = 0.4 + 0.4 * len(panels)
+        height = words + (height - words) * min(1.0, columns * WIDTH / wide)  # words stay as high as they are
     names = max((_wrap_names(axes.yaxis) for axes in panels), default=1)
     narrow.set_size_inches(WIDTH, height * (1.0 + 0.3 * (names - 1)))
     for axes in panels:

@@ -6,7 +6,8 @@ its noise. Two other looks do, and both must show the same:
 - *Above all motion.* From the frequency on from which no motion leaves the counts that it is between, what is
   in a signal moves nothing. A reading that flips between two counts has a variance of a quarter of their
   square, the most that it can have; what a signal may do there unseen follows from what a motion costs at
-  least, per acceleration, where it is seen. A record in which that is more than the white noise is not used.
+  least, per acceleration, where it is seen. Records in which that is more than the white noise are used where
+  all are such, as on a drive without a gear, and there are three of them: then the other look decides.
 - *What is left of a block* that the signal drives, whatever its numbers are and whichever plain functions of
   the motion it lacks. It bounds the noise from above at the frequencies of the motion.
 
@@ -39,7 +40,7 @@ from .noise import Band, Colour, Noise, NoisePart, Stretch, bands_of, fitted_at,
 _SURELY = 3.0
 """Standard errors of a band by which a motion stands out of its counts to be seen: by chance, one band in a
 thousand does."""
-_LEAST_BANDS = 4
+_LEAST_BANDS, _LEAST_RECORDS = 4, 3
 _SEEN = 9.0
 """Deviance by which a first-order process must describe the bands above all motion better than none does."""
 _OPEN = 1.2
@@ -66,7 +67,10 @@ def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[Block
         read = _Signal(signal, noise, tuple(records.deciding))
         # The bands above all motion of each record in which they show a colour.
         above = {record.name: read.above_motion(record, counts) for record in read.records}
-        shown = {name: bands for name, bands in above.items() if bands}
+        sure = {name: bands for name, (bands, hidden) in above.items() if bands and not hidden}
+        shown = sure or {name: bands for name, (bands, _) in above.items() if bands}
+        if not sure and len(shown) < _LEAST_RECORDS:
+            continue
         for each in seen if shown else ():
             colours = read.colours(each, shown)
             if colours:
@@ -92,8 +96,11 @@ class _Signal(NamedTuple):
     noise: Noise
     records: tuple[Record, ...]
 
-    def above_motion(self, record: Record, counts: Mapping[str, float]) -> list[Band]:
-        """Return the bands of the signal above all motion; none where they look white, or may be real."""
+    def above_motion(self, record: Record, counts: Mapping[str, float]) -> tuple[list[Band], bool]:
+        """Return the bands of the signal above all motion, none where they look white.
+
+        Beside them, whether a motion that moves no count may be in them.
+        """
         highest, hidden = 0.0, 0.0
         spent = bands_of([Stretch(record.trace[self.name], record.step, 0)])
         for name, count in counts.items():
@@ -109,11 +116,10 @@ class _Signal(NamedTuple):
                 hidden = max(hidden, unseen * min(costs.values()))
         above = [band for band in spent if band.frequency > highest][1:]  # the next band is partly below
         if not counts or len(above) < _LEAST_BANDS:
-            return []
-        if hidden * above[0].frequency ** 4 >= self.noise.level[self.name] ** 2:
-            return []
+            return [], True
         plain, *others = (fitted_at(time, above, record.step).deviance for time in (0.0, *_times(record)))
-        return above if min(others) < plain - _SEEN else []
+        moves = hidden * above[0].frequency ** 4 >= self.noise.level[self.name] ** 2
+        return above if min(others) < plain - _SEEN else [], moves
 
     def colours(self, seen: BlockNoise, shown: Mapping[str, list[Band]]) -> dict[str, Colour]:
         """Return the colour of the signal in each record that shows it; none where one contradicts."""

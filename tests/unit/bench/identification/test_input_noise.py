@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,8 @@ from tests.rig.conditions import first_order_noise
 from tests.rig.kind_cases import write_kind_case
 
 STEP, COUNT, WHITE, SLOW, TIME = 0.002, 3000, 0.02, 0.03, 0.03
+COARSE = 4e-3
+"""Counts behind which a torque as large as the white noise may turn the body unseen."""
 UNITS = {"encoder.reading": "rad", "ball.torque": "N*m"}
 
 
@@ -42,13 +45,14 @@ def turned(
     beside_reversals: float = 0.0,
     ripple: float = 0.0,
     count: float = 1e-5,
+    frequencies: Sequence[float] = (0.7, 1.6),
 ) -> tuple[Bench, Array]:
-    """Two records with noise in the torque, ``slow`` of it remembered; with the noise of the first.
+    """Some records with noise in the torque, ``slow`` of it remembered; with the noise of the first.
 
     ``beside_reversals``: by how much more there is where the body is slow. ``ripple``: torque over the angle.
     """
     draw, time, records, noises = np.random.default_rng(7), STEP * np.arange(COUNT), [], []
-    for name, frequency in (("slow", 0.7), ("quick", 1.6)):
+    for name, frequency in zip(("slow", "quick", "between"), frequencies, strict=False):
         pace = 2.0 * np.pi * frequency
         angle, rate = np.sin(pace * time), pace * np.cos(pace * time)
         remembered = first_order_noise(COUNT, memory / STEP, draw)
@@ -108,6 +112,16 @@ def test_what_is_no_noise_is_not_taken_for_it(
 
 def test_counts_that_hide_what_a_torque_does_show_no_colour() -> None:
     assert turned(SLOW, count=3e-3)[0].noise.evidence["ball.torque"] == "white only"
+
+
+def test_where_counts_may_hide_it_in_all_of_three_records_what_the_balance_leaves_decides() -> None:
+    three = (0.7, 1.6, 1.1)
+    assert turned(SLOW, count=COARSE)[0].noise.evidence["ball.torque"] == "white only", "two are too few"
+    bench, _ = turned(SLOW, count=COARSE, frequencies=three)
+    assert bench.noise.evidence["ball.torque"] == "above motion"
+    assert bench.noise.deviation("ball.torque") == pytest.approx(float(np.hypot(WHITE, SLOW)), rel=0.15)
+    bench, _ = turned(SLOW, count=COARSE, frequencies=three, ripple=0.2)
+    assert bench.noise.evidence["ball.torque"] == "white only", "what goes with the motion is no noise"
 
 
 @pytest.mark.long_cases("belt_axis")
