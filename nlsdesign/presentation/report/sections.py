@@ -32,7 +32,7 @@ from ..figures.svg import figure_data
 from ..figures.telephone import for_telephone
 
 _CODE = re.compile(r"`([^`\n]+)`")
-_DOTS = re.compile(r"(?<=[a-z\]])\.(?=[a-z])|(?<=\w)_(?=\w)|(?<=[a-z]{3})(?=[A-Z][a-z]{2})")
+_DOTS = re.compile(r"(?<=[a-z\]])\.(?=[a-z])|(?<=\w)_(?=\w)|(?<=[a-z])(?=[A-Z][a-z]{3})")
 """Dots within a hierarchical name, underscores, and ends of words in a compound: there a line may break."""
 
 
