@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import re
-
-from nlsdesign.presentation.figures.svg import inline_svg
+from typing import Any
 
 from . import markup
 
@@ -21,8 +20,8 @@ def with_picture(page: str) -> str:
         Markdown; its one block of Python leaves a ``figure``.
     """
     (code,) = _CODE.findall(page)
-    drawn: dict[str, object] = {}
+    drawn: dict[str, Any] = {}
     exec(code, drawn)
-    svg = inline_svg(drawn["figure"], "reference")  # type: ignore[arg-type]
+    svg = markup.drawings(drawn["figure"], "reference")
     words = "The cam of the reference actuator at two angles, with its cable and the rubber behind it."
     return page.replace(_PLACE, markup.plot(svg, words))

@@ -7,6 +7,9 @@ import re
 from collections.abc import Sequence
 from html import escape
 
+from nlsdesign.presentation.figures import Figure, inline_svg
+from nlsdesign.presentation.figures.telephone import for_telephone
+
 from . import formula
 
 _SECTION = re.compile(r"^(Parameters|Returns|Raises|Examples|Yields|Notes)\n-+\n", re.M)
@@ -43,6 +46,20 @@ def folded(summary: str, content: str) -> str:
         Markdown.
     """
     return f"<details><summary>{summary}</summary>\n\n{content}\n\n</details>\n\n"
+
+
+def drawings(figure: Figure, key: str) -> str:
+    """Return a figure as SVG, drawn for a desk and for a telephone.
+
+    Parameters
+    ----------
+    figure
+        From :mod:`nlsdesign.presentation.figures`.
+    key
+        Identifier that no other figure of the page uses.
+    """
+    desk, telephone = inline_svg(figure, key), inline_svg(for_telephone(figure), f"{key}-narrow")
+    return f'<div class="wide">{desk}</div><div class="narrow">{telephone}</div>'
 
 
 def plot(svg: str, caption: str) -> str:

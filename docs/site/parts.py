@@ -15,7 +15,6 @@ from nlsdesign.components.assembly.deck_writer import deck_text
 from nlsdesign.components.core.part_numbers import readings, templates
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.foundation.quantity import Quantity, typeset_unit
-from nlsdesign.presentation.figures.svg import inline_svg
 from tests.parts import examples
 from tests.parts.systems import around
 
@@ -86,7 +85,7 @@ def drawing(name: str, parts: list[Part]) -> str:
         except NlsError:  # for instance dry friction, which needs an inertia that it can hold
             continue
         if figure is not None:
-            return markup.plot(inline_svg(figure, name), escape(part.title()))
+            return markup.plot(markup.drawings(figure, name), escape(part.title()))
     return ""
 
 

@@ -90,7 +90,8 @@ def _show(description: RecordsDescription) -> None:
         )
         for c in description.columns
     ]
-    show_table("Columns, in the units of the files", heads, cells)
+    if cells:
+        show_table("Columns, in the units of the files", heads, cells)
     if description.records is not None:
         named = [(r.name, str(len(r.trace)), r.role.replace("_", " ")) for r in description.records.records]
         show_table("Records", ("record", "rows", "used for"), named)

@@ -175,14 +175,17 @@ def _both_sides(
     )  # fmt: skip
     files = [*write_sides(both, out, machined=machined_cam(both.front, job) if both.met else None)]
     sides = {"front": both.front, "back": both.back}
-    files += [write_design_report(out / f"{name}.html", side, deck=deck) for name, side in sides.items()]
+    chosen = f"what both sides share was chosen by the {both.chosen_by}"
+    for name, side in sides.items():
+        remarks = [f"the {name} of the cam: {chosen}"]
+        files.append(write_design_report(out / f"{name}.html", side, deck=deck, remarks=remarks))
     if as_json:
         numbers = {name: design_summary(side) for name, side in sides.items()}
         show_json({**numbers, "chosen_by": both.chosen_by, "files": files})
     else:
         for name, side in sides.items():
             show_table(f"Design, {name}", ("what", "value"), side.rows())
-        click.echo(f"what both sides share was chosen by the {both.chosen_by}")
+        click.echo(chosen)
         click.echo("written: " + ", ".join(str(path) for path in files))
     sys.exit(0 if both.met else 1)
 

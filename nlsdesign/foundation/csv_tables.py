@@ -17,6 +17,7 @@ import warnings
 from array import array
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -225,6 +226,15 @@ def _is_number(cell: str) -> bool:
     return True
 
 
+def _since_1970(cell: str) -> float:
+    """Return date and time of day, as loggers write them, in s since 1970; zero where it is none."""
+    with contextlib.suppress(ValueError, OverflowError):
+        stamp = datetime.fromisoformat(cell)
+        if ":" in cell:
+            return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()
+    return 0.0
+
+
 def _is_unit(cell: str) -> bool:
     try:
         parse_unit(unit_as_written(cell.strip("[]()")))
@@ -260,6 +270,9 @@ def _cell_by_cell(file: Path, layout: _Layout, lines: array[int]) -> dict[str, A
                 raise _no_number(layout, head, ended[head], "")
             elif _is_number(cell):
                 columns[head].append(float(cell))
+            elif stamp := _since_1970(cell):
+                layout.units.setdefault(head, "s")
+                columns[head].append(stamp)
             else:
                 raise _no_number(layout, head, row, cell)
     return {head: np.array(column) for head, column in columns.items()}

@@ -63,8 +63,8 @@ def write_page(results: Results, out: Path) -> None:
     """Write ``report.html``: what came out, a chapter for each of two readers, and the rest folded."""
     nls.write_report(
         out / "report.html",
-        key_numbers(results),
         answers(results),
+        key_numbers(results),
         *chapter_of_design(results),
         Chapter("Estimate and control, for the control engineer", CONTROL),
         *observer_sections(results),

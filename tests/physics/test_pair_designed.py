@@ -29,9 +29,12 @@ from nlsdesign.design.statics.contour import PairContour
 from nlsdesign.foundation.errors import ArrangementError
 from nlsdesign.foundation.quantity import quantity
 from nlsdesign.live.gallery import question_of
+from nlsdesign.presentation.figures.cam_motion import numbers_at
+from nlsdesign.presentation.report import write_design_report
 from tests.cam_cases import CONTOUR, PRETENSION, actuator
 from tests.dxf_reading import header_of, polylines_of
 from tests.rolled import along_edge, rolled_on, way_of
+from tests.undrawn import without_drawing
 
 QUICK = DesignSettings(starts=4, draws=0, look_for_size_ranges=False, look_for_remedies=False)
 RATE, LENGTH, TRAVEL = 1186.0, 14.4e-3, 15.87e-3
@@ -94,6 +97,20 @@ def test_the_published_joint_comes_out_with_its_own_coil(hills: CamDesign) -> No
     theirs = published_profile(HILLS, stretched)
     away = [float(np.min(np.hypot(*(theirs - point).T))) for point in contour.points[5::7]]
     assert max(away) < 5e-5
+
+
+def test_its_page_speaks_of_no_cable_and_of_no_torque_where_it_jumps(
+    hills: CamDesign, tmp_path: Path
+) -> None:
+    with without_drawing():
+        page = write_design_report(tmp_path / "report.html", hills, deck="rolling_pair_drive").read_text(
+            "utf8"
+        )
+    assert "element force" in page
+    assert not any(each in page for each in ("cable force", "cable without", "rubber is drawn"))
+    assert "TabulatedTorque, up to 89.8 deg, at most 0.07 N·m. The design meets its target" in page
+    assert numbers_at(hills, 0.0).endswith("torque begins here")
+    assert numbers_at(hills, float(hills.check.angles[-1])).endswith(" 35 mN·m")
 
 
 @pytest.mark.slow

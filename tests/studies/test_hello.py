@@ -11,6 +11,7 @@ from click.testing import CliRunner
 
 from nlsdesign.cli import studies as runner
 from nlsdesign.foundation.errors import NlsError
+from tests.undrawn import without_drawing
 
 MOST_LINES = 49
 
@@ -18,7 +19,8 @@ MOST_LINES = 49
 @pytest.fixture(scope="module")
 def hello(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, float]]:
     out = tmp_path_factory.mktemp("hello")
-    return out, runner.run_study("hello", out)
+    with without_drawing():
+        return out, runner.run_study("hello", out)
 
 
 def test_the_study_keeps_its_claims(hello: tuple[Path, dict[str, float]]) -> None:
@@ -27,6 +29,10 @@ def test_the_study_keeps_its_claims(hello: tuple[Path, dict[str, float]]) -> Non
     assert runner.not_as_claimed(results, runner.claims("hello")) == {}
     report = (out / "report.html").read_text(encoding="utf8")
     assert "spring.cam.lever_arm" in report.replace("<wbr>", "")
+    assert "The design meets its target" in report
+    assert report.count("<figure") == 6, (
+        "the cam twice, torque, limits, made springs by cause and over the angle"
+    )
 
 
 def test_it_fits_on_one_page(root: Path) -> None:

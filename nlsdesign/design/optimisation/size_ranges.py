@@ -49,9 +49,9 @@ class SizeRange:
 
     @property
     def wide(self) -> bool:
-        """Whether the ends are clearly apart, or one of them was not found."""
+        """Whether the ends are clearly apart, or one of them alone was not found."""
         if self.lowest is None or self.highest is None:
-            return True
+            return self.lowest is not self.highest
         return self.highest > _WIDE * self.lowest + 1e-12
 
 

@@ -91,7 +91,9 @@ class TrimEffect:
 
     def __str__(self) -> str:
         factor = parse_unit(self.unit).factor
-        ends = " to ".join(f"{end / factor:.4g}" for end in self.needed)
+        ends = " to ".join(
+            f"{round(end / factor, 9) + 0.0:.4g}" for end in self.needed
+        )  # no rounding of zero
         return f"trim of {self.name}: {self.quantiles[-1]}, set from {with_unit(ends, self.unit)}"
 
 

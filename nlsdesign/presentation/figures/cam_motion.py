@@ -19,6 +19,7 @@ from ...design.statics.contour import RollerContour, RollingContour, cable_up_to
 from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, typeset_number
+from ...foundation.written_numbers import prefixed
 from ...model import FlatModel
 from .style import (
     BLUE,
@@ -393,15 +394,21 @@ def draw_rolling(axes: Axes, design: CamDesign, contour: RollingContour, angle: 
     end = MM * _reach(contour)
     axes.plot([0.0, 0.0], [0.0, end], color=INK.light, linewidth=0.8, linestyle=(0, (8, 2, 1, 2)))
     axes.plot([0, centre[0]], [0, centre[1]], "o", color=INK.light, markersize=4)
-    curves, check = design.curves, design.check
-    numbers = (
-        f"arm {MM * float(np.interp(angle, contour.angles, contour.lever_arms)):.1f} mm",
-        f"{float(np.interp(angle, curves.angles, curves.forces)):.0f} N",
-        f"{float(np.interp(angle, check.angles, check.torques)):.3g} N·m",
-    )
-    axes.set_title(f"{np.degrees(angle):.0f}°: {', '.join(numbers)}", fontsize=8.5)
+    axes.set_title(numbers_at(design, angle), fontsize=8.5)
     axes.set_aspect("equal")
     axes.grid(visible=False)
+
+
+def numbers_at(design: CamDesign, angle: float) -> str:
+    """Return lever arm, force and torque at an angle in rad as text."""
+    contour, curves, check = design.contour, design.curves, design.check
+    arm = float(np.interp(angle, contour.angles, contour.lever_arms))
+    force = float(np.interp(angle, curves.angles, curves.forces))
+    torque = float(np.interp(angle, check.angles, check.torques))
+    # Where the torque jumps, or begins within an onset, zero would contradict arm and force.
+    begins = torque == 0.0 and abs(arm * force) > 1e-3 * design.target.largest
+    words = "torque begins here" if begins else prefixed(torque)
+    return f"{np.degrees(angle):.0f}°: arm {MM * arm:.1f} mm, {prefixed(force, 'N')}, {words}"
 
 
 def _rolls(contour: RollingContour, angle: float) -> tuple[Array, ...]:

@@ -24,7 +24,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ValueRangeError
 from ...foundation.quantity import MM, parse_unit, typeset_number, typeset_unit, with_unit
 from ...foundation.written_numbers import shared_prefix
-from .cam_motion import draw_rolling, rolling_picture
+from .cam_motion import draw_rolling, numbers_at, rolling_picture
 from .style import (
     AFTER,
     BEFORE,
@@ -134,7 +134,6 @@ def draw_mechanism(axes: Axes, design: CamDesign, angle: float) -> None:
         halves = [np.vstack([contour.points, [[0.0, 0.0]], contour.points[:1]])]
     for half in halves:
         axes.fill(*(turn(half, angle) * MM).T, facecolor=GRID.light, edgecolor=MUTED.light, linewidth=0.8)
-    arm = float(np.interp(angle, contour.angles, contour.lever_arms))
     point = np.array([[np.interp(angle, contour.angles, column) for column in contour.points.T]])
     contact = np.asarray(turn(point, angle)[0], dtype=float)
     end = _end_of_cable(contour, float(contour.radii.max())) + (contact * [0.0, 1.0] if parallel else 0.0)
@@ -149,11 +148,7 @@ def draw_mechanism(axes: Axes, design: CamDesign, angle: float) -> None:
     foot = (contact - along * float(contact @ along)) * MM
     axes.plot([0.0, foot[0]], [0.0, foot[1]], color=GREEN.light, linewidth=1.4, linestyle=(0, (2, 1)))
     axes.plot([0], [0], marker="o", color=INK.light, markersize=4, markerfacecolor=SURFACE.light)
-    force = float(np.interp(angle, design.curves.angles, design.curves.forces))
-    torque = float(np.interp(angle, design.check.angles, design.check.torques))
-    axes.set_title(
-        f"{np.degrees(angle):.0f}°: arm {MM * arm:.1f} mm, {force:.0f} N, {torque:.2f} N·m", fontsize=8.5
-    )
+    axes.set_title(numbers_at(design, angle), fontsize=8.5)
     axes.set_aspect("equal")
     axes.grid(visible=False)
 

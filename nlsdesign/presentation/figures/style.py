@@ -205,7 +205,9 @@ def legend(axes: Axes, *, columns: int = 4) -> None:
     needed = sum(4.9 * len(label) + 45.0 for label in labels) + 6.6 * len(title) + 20.0
     spec = axes.get_subplotspec()
     share = 1.0 if spec is None else (spec.colspan.stop - spec.colspan.start) / spec.get_gridspec().ncols
-    beside = side_by_side == len(labels) and needed <= share * 72.0 * WIDTH - 50.0
+    beside = (
+        side_by_side == len(labels) and "\n" not in title and needed <= share * axes.figure.bbox.width - 50.0
+    )
     axes.legend(
         handles,
         labels,

@@ -37,6 +37,9 @@ _LINK = "{http://www.w3.org/1999/xlink}href"
 _NUMBER = re.compile(r"-?\d+\.\d+")
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 _REFERENCE = re.compile(r"#([\w-]+)")
+_FONT = re.compile(r"font-family:[^;]*; ")
+"""The page gives the letters of its figures the font of its text."""
+_STRAIGHT = re.compile(r"([ML]) (\S+) (\S+)|z")
 _HASHED = re.compile(r'(?<=id=")([A-Za-z])[0-9a-f]{10}(?=")|(?<=#)([A-Za-z])[0-9a-f]{10}\b')
 """Identifiers that matplotlib makes of coordinates, whose last digits differ from processor to processor."""
 _MARKS = (f"{_SVG}use", f"{_SVG}path")
@@ -197,7 +200,7 @@ def _adapt(element: ET.Element, key: str, kept: set[str]) -> None:
     if "clip-path" in element.attrib:
         element.set("clip-path", element.get("clip-path", "").replace("url(#", f"url(#{key}-"))
     if "style" in element.attrib:
-        style = element.get("style", "").replace("url(#", f"url(#{key}-")
+        style = _FONT.sub("", element.get("style", "")).replace("url(#", f"url(#{key}-")
         element.set("style", _COLOUR.sub(lambda m: _VARIABLES.get(m[0].lower(), m[0]), style))
     for attribute in ("fill", "stroke"):
         # CSS variables work in styles, not in attributes.
@@ -206,7 +209,26 @@ def _adapt(element: ET.Element, key: str, kept: set[str]) -> None:
             element.set("style", f"{attribute}: {colour}; {element.get('style', '')}")
     for attribute in _GEOMETRY:
         if attribute in element.attrib:
-            element.set(attribute, _NUMBER.sub(_rounded, " ".join(element.get(attribute, "").split())))
+            numbers = _NUMBER.sub(_rounded, " ".join(element.get(attribute, "").split()))
+            element.set(
+                attribute, numbers if attribute != "d" or set("QC") & set(numbers) else _steps(numbers)
+            )
+    if element.get("transform", "").startswith("rotate(-0 "):
+        del element.attrib["transform"]
+
+
+def _steps(path: str) -> str:
+    """Return a path of straight lines as steps from point to point, which take half the letters."""
+    text, at = "", (0, 0)
+    for letter, *place in _STRAIGHT.findall(path):
+        if not letter:
+            text += "z"
+            continue
+        x, y = (round(10 * float(number)) for number in place)
+        step = (x, y) if letter == "M" else (x - at[0], y - at[1])
+        text += f"{letter if letter == 'M' else 'l'}{step[0] / 10:g} {step[1] / 10:g}".replace(" -", "-")
+        at = (x, y)
+    return text
 
 
 def _share_looks(group: ET.Element) -> None:

@@ -12,8 +12,7 @@ import numpy as np
 
 from ...design import CamDesign, ToleranceResult
 from ...foundation.errors import NlsError
-from ...foundation.quantity import three_digits
-from ...foundation.written_numbers import prefixed, shared_prefix
+from ...foundation.written_numbers import prefixed
 from ...model import flatten
 from ..figures import (
     cam_motion_of,
@@ -127,36 +126,37 @@ def write_design_report(
             )
         )
     facts = {"deck": f"`{deck}`", "fingerprint": f"`{design.fingerprint}`"}
-    return write_report(path, *sections, title=f"{design.actuator.name}: designed cam", facts=facts)
+    rows = dict(design.rows())
+    abstract = (
+        f"Asked for: {rows['target']}. The design {rows['verdict']}. "
+        f"Torque error over the spread: {rows['torque error over the spread']}."
+    )
+    title = f"{Path(deck).stem}: designed spring"
+    return write_report(path, *sections, title=title, abstract=abstract, facts=facts)
 
 
 def _key_numbers(design: CamDesign) -> tuple[KeyNumber, ...]:
     """Return tolerance, error and loads in large letters: what can be made first."""
     share = 100.0 * design.rms / design.target.largest
     verdict = "meets its target" if design.met else "misses its target"
+    pulled = "element" if design.cam.rolling else "cable"
     numbers = [
-        KeyNumber("torque error, exact numbers", f"{_shown(design.rms)} rms", f"{share:.2g} %; {verdict}"),
-        KeyNumber("largest error", _shown(design.check.largest), "exact numbers"),
-        KeyNumber("cable force", f"{three_digits(float(design.curves.forces.max()))} N", "largest"),
+        KeyNumber("torque error, exact numbers", f"{prefixed(design.rms)} rms", f"{share:.2g} %; {verdict}"),
+        KeyNumber("largest error", prefixed(design.check.largest), "exact numbers"),
+        KeyNumber(f"{pulled} force", prefixed(float(design.curves.forces.max()), "N"), "largest"),
         KeyNumber(
             "limits reached", str(len(design.active_limits)), ", ".join(design.active_limits) or "none"
         ),
     ]
     if design.tolerance is not None and design.tolerance.causes:
-        built = _shown(design.tolerance.quantiles[-1].value)
+        built = prefixed(design.tolerance.quantiles[-1].value)
         trims = design.tolerance.trims[:1]
-        after = [_shown(each.quantiles[-1].value) for each in trims]
+        after = [prefixed(each.quantiles[-1].value) for each in trims]
         note = f"as built → {trims[0].name} trimmed" if trims else "as built"
         label = f"torque error, {100 * design.tolerance.quantiles[-1].share:g} % of made springs"
         number = KeyNumber(label, f"{(after or [built])[0]} rms", note, before=built if after else "")
         numbers.insert(0, number)
     return tuple(numbers)
-
-
-def _shown(torque: float) -> str:
-    """Return a torque with three digits and the prefix that fits."""
-    factor, unit = shared_prefix([torque], "N*m")
-    return f"{three_digits(factor * torque)} {unit}"
 
 
 def _moved(design: CamDesign) -> list[Section]:
@@ -168,7 +168,7 @@ def _moved(design: CamDesign) -> list[Section]:
     except NlsError:
         return []
     caption = "The designed cam. Move the slider to turn it."
-    return [CamSection("Cam, cable and rubber", motion, caption=caption, assumed="Rubber at rest.")]
+    return [CamSection("The cam, to turn", motion, caption=caption, assumed="What is stretched is at rest.")]
 
 
 def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
@@ -187,8 +187,8 @@ def design_sections(design: CamDesign, *, of: str = "") -> list[Section]:
         FigureSection(
             f"The design to scale{behind}",
             design_picture(design),
-            caption="Above at rest, below at the last angle; in mm. The rubber is drawn as if square.",
-            assumed="Rubber at rest, cable without thickness.",
+            caption="Above at angle zero, below at the last angle; in mm.",
+            assumed="" if design.cam.rolling else "What is stretched is at rest; cable without thickness.",
         ),
         FigureSection(
             f"Torque against the target{behind}",

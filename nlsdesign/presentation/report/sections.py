@@ -29,10 +29,11 @@ from ...foundation.work_sharing import parallel_map
 from ..figures import Figure, inline_svg
 from ..figures.style import TONES, alternative_text, compact
 from ..figures.svg import figure_data
+from ..figures.telephone import for_telephone
 
 _CODE = re.compile(r"`([^`\n]+)`")
-_DOTS = re.compile(r"(?<=[a-z\]])(\.)(?=[a-z])|(?<=\w)(_)(?=\w)")
-"""Dots within a hierarchical name and underscores, behind which a line may break."""
+_DOTS = re.compile(r"(?<=[a-z\]])\.(?=[a-z])|(?<=\w)_(?=\w)|(?<=[a-z])(?=[A-Z][a-z]{3})")
+"""Dots within a hierarchical name, underscores, and ends of words in a compound: there a line may break."""
 
 
 class Html(str):
@@ -261,11 +262,16 @@ class FigureSection(Section):
             )  # fmt: skip
 
     def content(self, place: PagePosition) -> Mapping[str, Any]:
-        """Return the figure as inline SVG, and its texts."""
+        """Return the figure as inline SVG, drawn for a desk and for a telephone or paper, and its texts."""
         svg = Html(inline_svg(self.figure, place.key, alternative=self.alternative))
+        narrow = Html("")
+        if "<a " not in svg:  # points that lead to their design stay on a figure that is moved sideways
+            small = for_telephone(self.figure)
+            narrow = Html(inline_svg(small, f"{place.key}-narrow", alternative=self.alternative))
         data = data_link(self.figure, self.title) if self.data is None else file_link(self.data, place.folder)
         return {
-            "svg": svg, "data": data, "caption": self.caption, "means": self.means, "assumed": self.assumed,
+            "svg": svg, "narrow": narrow, "data": data, "caption": self.caption, "means": self.means,
+            "assumed": self.assumed,
         }  # fmt: skip
 
 

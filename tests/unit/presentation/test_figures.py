@@ -15,6 +15,7 @@ import pytest
 from matplotlib import pyplot
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.colors import to_hex
+from matplotlib.text import Text
 
 from nlsdesign.design.statics.contour import contour_from_curvature
 from nlsdesign.foundation.errors import ExportError, UnknownNameError, ValueRangeError
@@ -25,6 +26,7 @@ from nlsdesign.presentation.figures.before_after import HeldOut, held_out_series
 from nlsdesign.presentation.figures.cam_motion import MARKER, CamMotion, cam_motion, cam_picture
 from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text, look
 from nlsdesign.presentation.figures.svg import svg_text, thinned
+from nlsdesign.presentation.figures.telephone import for_telephone
 from tests import figure_samples as samples
 from tests.selection import quick_only
 
@@ -97,6 +99,30 @@ def test_an_inline_figure_fits_into_any_page(name: str) -> None:
     assert not {f"{SVG}style", f"{SVG}metadata", f"{SVG}script"} & {element.tag for element in root.iter()}
     assert re.findall(r"#[0-9a-f]{6}\b", text) == []
     assert "var(--ink" in text
+
+
+@pytest.mark.parametrize("name", ["cam_positions", "margins", "tolerance_bars"])
+def test_a_figure_for_a_telephone_holds_its_words_and_leaves_the_given_one_alone(name: str) -> None:
+    figure = drawn(name)
+    before, narrow = svg_text(figure), for_telephone(figure)
+    narrow.draw_without_rendering()
+    # Letters of 9 points in a picture of 353: as high on a screen 350 pixels wide.
+    width, height = narrow.bbox.size
+    assert width <= 353.0
+    boxes = [axes.get_window_extent() for axes in narrow.axes]
+    assert all(abs(box.x0 - boxes[0].x0) < 80.0 for box in boxes), "panels stand below each other"
+    ticks = {label for axes in narrow.axes for label in (*axes.get_xticklabels(), *axes.get_yticklabels())}
+    for text in narrow.findobj(Text):
+        if text.get_text().strip() and text not in ticks:
+            box = text.get_window_extent()
+            assert -1.0 < box.x0 < box.x1 < width + 1.0, text.get_text()
+            assert -1.0 < box.y0 < box.y1 < height + 1.0, text.get_text()
+    assert svg_text(figure) == before
+
+
+def test_steps_end_where_the_points_were() -> None:
+    path = "M 1 2.5 L 1.1 -3 L 1.1 7.25 z M 0 0 L -0.1 0"
+    assert svg._steps(path) == "M1 2.5l0.1-5.5l0 10.2zM0 0l-0.1 0"
 
 
 def test_the_marker_of_the_cam_keeps_its_name() -> None:

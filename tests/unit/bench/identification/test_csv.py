@@ -40,6 +40,12 @@ def with_heads(*heads: str) -> list[str]:
     return [";".join(heads), *with_commas(";")[1:]]
 
 
+def dated(row: str) -> str:
+    seconds, comma, rest = row.partition(",")
+    stamp = datetime.datetime(2026, 3, 29, 1, 59, 59) + datetime.timedelta(seconds=float(seconds))
+    return stamp.isoformat(" ", "milliseconds") + comma + rest
+
+
 UNITLESS = ("t", "encoder.reading", "cell.reading")
 WRITTEN = {
     "plain": (PLAIN, "utf-8"),
@@ -59,6 +65,7 @@ WRITTEN = {
     "quotes": (['"' + PLAIN[0].replace(",", '","') + '"', *PLAIN[1:]], "utf-8"),
     "Windows": ([f"{row}\r" for row in PLAIN], "utf-8"),
     "Excel in Europe": ([*with_heads("t [s]", "encoder.reading [°]", "cell.reading [N·m]")], "cp1252"),
+    "dates": ([",".join(("timestamp", *HEADS[1:])), *map(dated, PLAIN[1:])], "utf-8"),
     "German heads": ([*with_heads("Zeit in s", "Winkel (°)", "Drehmoment / Nm")], "utf-8"),
     "a comment between rows": ([*PLAIN[:9], "# a note", "", *PLAIN[9:]], "utf-8"),
 }  # fmt: skip
