@@ -50,7 +50,8 @@ def between_gaps(table: RecordTable, mapping: ColumnMap) -> Pieces:
     place = f"{table.file}: column '{head}', {rows_in_words(gaps[:1] + 1, table.first_row)}"
     if float(np.max(steps)) <= _LATE * usual and len(gaps) <= _LARGEST_SHARE * len(time):
         filled, count = _filled(table, gaps, np.rint(steps / usual).astype(int))
-        text = f"{count} missing samples were filled in by straight lines, where {len(gaps)} came late"
+        filled_in = "1 missing sample was" if count == 1 else f"{count} missing samples were"
+        text = f"{filled_in} filled in by straight lines, where {len(gaps)} came late"
         return Pieces((filled,), (Finding(place, text),))
     factor = parse_unit(mapping.time.unit).factor
     seconds = factor * steps
