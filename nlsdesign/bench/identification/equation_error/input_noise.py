@@ -115,7 +115,7 @@ class _Signal(NamedTuple):
                 highest = max(highest, max(costs))
                 hidden = max(hidden, unseen * min(costs.values()))
         above = [band for band in spent if band.frequency > highest][1:]  # the next band is partly below
-        if not counts or len(above) < _LEAST_BANDS:
+        if not counts or len(above) < _LEAST_BANDS or not all(band.density for band in above):
             return [], True
         plain, *others = (fitted_at(time, above, record.step).deviance for time in (0.0, *_times(record)))
         moves = hidden * above[0].frequency ** 4 >= self.noise.level[self.name] ** 2
