@@ -23,7 +23,7 @@ export OPENBLAS_NUM_THREADS := 1
 unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
-.PHONY: help study test thorough tutorial kernels mutation lint bench masters targets proofs firmware wheels docs paper gallery environment lock clean distclean
+.PHONY: help study test thorough tutorial kernels mutation lint style types bench masters targets proofs firmware wheels docs paper gallery environment lock clean distclean
 
 help:
 	@echo 'make study      a small study, then that of the published actuator; the report goes to $(OUT)/report.html'
@@ -60,17 +60,24 @@ ifeq ($(STUDY),austin2015)
 endif
 	@$(BIN)/nlsdesign study run '$(STUDY)' --out '$(OUT)'
 
-lint: environment
+style: environment
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
+
+types: environment
 	$(BIN)/pyrefly check --python-interpreter-path $(BIN)/python --min-severity error --summary=none
+
+lint: style types
 
 # To rewrite assertions so that they show their numbers takes a quarter minute of each worker, so only those that fail
 # are run again with it; the run has failed all the same.
-test: lint
+# Types are checked beside the first tests, so that no core waits.
+test: style
+	@$(MAKE) --no-print-directory types & types=$$!; \
 	$(BIN)/python -m pytest -n $(WORKERS) $(SHARED_OUT) -m 'not slow' --assert plain || { status=$$?; \
 		[ $$status -ne 1 ] || $(BIN)/python -m pytest -m 'not slow' --last-failed --last-failed-no-failures none; \
-		exit $$status; }
+		exit $$status; }; \
+	wait $$types
 
 # A second checker of types takes five times as long and finds next to nothing that the first one passed.
 thorough: lint docs

@@ -12,6 +12,9 @@ from hypothesis import settings
 
 from nlsdesign.foundation import symbolic
 
+# What is imported and collected stays: there is no garbage until the first test runs.
+gc.disable()
+
 # Before anything imports matplotlib: no test opens a window.
 os.environ["MPLBACKEND"] = "Agg"
 # Two exports of one test are the same bytes, on either side of a full minute.
@@ -55,6 +58,7 @@ def pytest_collection_finish() -> None:
     """What was collected stays until the end; garbage is looked for after 300,000 new objects, not 700."""
     gc.collect()
     gc.freeze()
+    gc.enable()
     gc.set_threshold(300_000, 20, 50)
 
 

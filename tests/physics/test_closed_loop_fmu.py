@@ -42,7 +42,7 @@ def fmus(models: dict[str, nls.FlatModel], tmp_path_factory: pytest.TempPathFact
 
 # The scheduled law divides by the small stiffness around zero, which enlarges the integration error at the
 # corner of the friction until a count of the encoder falls one sample later: shorter steps there.
-@pytest.mark.long_cases("PID")
+@pytest.mark.long_cases("scheduled", "PID")
 @pytest.mark.parametrize(("scheduled", "substeps"), [(False, 40), (True, 320)], ids=["PID", "scheduled"])
 def test_co_simulated_loop_is_that_of_one_piece_at_every_step(
     scheduled: bool, substeps: int, models: dict[str, nls.FlatModel], fmus: dict[str, Path], tmp_path: Path

@@ -132,6 +132,7 @@ def test_faster_than_a_prototype_with_the_same_condition(viscosity: float, reach
     assert np.linalg.cond(proved.proof.lyapunov) <= 60.0
 
 
+@pytest.mark.slow
 def test_what_is_too_fast_is_answered_with_the_fastest() -> None:
     model = plant(DECKS[1], 31e3)
     limit = model.values[MODULUS] / 31e3

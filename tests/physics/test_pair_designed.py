@@ -84,6 +84,7 @@ def published_profile(target: TabulatedTorque, way_at_end: float) -> np.ndarray:
     return halves[:, None] * normals + arms[:, None] * along
 
 
+@pytest.mark.slow
 def test_the_published_joint_comes_out_with_its_own_coil(hills: CamDesign) -> None:
     """The jump at zero is a facet; the cam is that of the authors' program with the coil as far stretched."""
     cam, contour = hills.actuator["spring.cam"], hills.contour

@@ -184,6 +184,7 @@ def test_the_drawing_holds_the_way_the_roller_and_the_line_of_the_follower(
     assert all(line[0, :2] == pytest.approx([0.0, 0.0]) for line in lines)
 
 
+@pytest.mark.slow
 def test_the_part_and_its_page_say_roller(signs: CamDesign, tmp_path: Path) -> None:
     text = drawn(signs, tmp_path)
     assert "for a roller of radius 5 mm" in text

@@ -94,6 +94,7 @@ def test_a_name_that_does_not_exist_is_noticed() -> None:
 
 
 @pytest.mark.long_cases(
+    "how_to/analyse_over_the_angle.md",
     "how_to/sweep_designs.md",
     "how_to/use_the_fmus.md",
     "how_to/run_many_at_once.md",

@@ -92,6 +92,7 @@ def test_flat_model_and_simulation(scheme: Scheme, deck: str) -> None:
     equal(machine.keys(traces[0]), traces[1])
 
 
+@pytest.mark.slow
 @pytest.mark.long_cases("exchanged", "nested", "against_the_order")
 @EVERY
 def test_analyse(run: Run, tmp_path: Path, scheme: Scheme) -> None:

@@ -145,6 +145,7 @@ def test_numbers_are_written_anew_and_words_are_kept() -> None:
     assert tutorial.renewed("error 1 mN·m …\nlost 5\n", printed) == "error 3.25 mN·m …\nlost 5\n"
 
 
+@pytest.mark.slow
 def test_a_command_that_fails_is_noticed(tmp_path: Path) -> None:
     page = tmp_path / "1_page.md"
     page.write_text("```sh\nnlsdesign deck check no_such_deck\n```\n", encoding="utf-8")

@@ -260,6 +260,7 @@ def test_the_observer_asks_for_a_deck_or_a_command_that_exists(
     assert said in err
 
 
+@pytest.mark.slow
 def test_analyse_without_a_command_goes_over_the_angle(
     run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

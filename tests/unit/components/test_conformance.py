@@ -167,6 +167,7 @@ def sources(part: Part, folder: Path) -> Path:
 
 
 # Each takes a run of the compiler; a new component is compiled by the thorough run.
+@pytest.mark.long_cases("Buckling", "GravityLoad-MassOnArm", "SampleAndHold", "CapstanFriction-WrapProduct")
 @pytest.mark.parametrize("name", quick_only(EXAMPLES, list(EXAMPLES)[::12]))
 def test_it_becomes_c_that_compiles(name: str, tmp_path: Path) -> None:
     part = EXAMPLES[name]

@@ -124,7 +124,7 @@ def test_where_counts_may_hide_it_in_all_of_three_records_what_the_balance_leave
     assert bench.noise.evidence["ball.torque"] == "white only", "what goes with the motion is no noise"
 
 
-@pytest.mark.long_cases("belt_axis")
+@pytest.mark.long_cases("screw_carriage", "belt_axis")
 @pytest.mark.parametrize("kind", ["screw_carriage", "belt_axis"])
 def test_a_clean_machine_whose_current_has_a_colour_gets_no_name(kind: str, tmp_path: Path) -> None:
     """A drifting clock was named on the belt: its floor was too low, and half a sample of a hold was left."""
