@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import gc
 import os
 import platform
 import re
@@ -106,6 +107,8 @@ def _with_nearest(error: click.ClickException) -> click.ClickException:
 def main() -> None:
     """Run the command line; bad input ends with one message and exit status 2."""
     output = sys.stdout
+    # What is imported stays: garbage is looked for after 100,000 new objects, not 700.
+    gc.set_threshold(max(gc.get_threshold()[0], 100_000), 20, 50)
     try:
         # Without its standalone mode click returns the exit status of a command instead of ending the run.
         status = program(standalone_mode=False, complete_var=COMPLETE)
