@@ -72,7 +72,8 @@ def _body(
     name: str, joint: str, inertia: float, weight: float, *, inside: str = "", joint_text: str = ""
 ) -> str:
     """Return a body on a hinge: its mass hangs below the axis, its armature makes up the inertia."""
-    arm = 0.1
+    # In m; shorter where a heavy and light load would have more inertia on it than it has.
+    arm = min(0.1, 4.0 * inertia / weight) if weight else 0.1
     mass = max(weight / (9.81 * arm), 1e-3)
     own = mass * arm * arm
     rod = max(min(0.3 * inertia, _ROD), 1e-7)

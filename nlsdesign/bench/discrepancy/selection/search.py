@@ -290,7 +290,8 @@ class _Search:
         while steps:
             self.trials.progress("fitting what was named to all samples")
             last = self.trials.comparison.polished(steps[-1].chosen)
-            words = objections_of_all(self.trials.criteria, last)
+            # What the search began beside, such as a delay of a motion, is no name and is not asked.
+            words = objections_of_all(self.trials.criteria, last)[len(start.added) :]
             if not any(words):
                 return last
             for step, why in zip(steps, words, strict=True):

@@ -441,6 +441,21 @@ def test_an_effect_whose_numbers_fail_on_all_samples_makes_room_for_one_that_is_
     assert "a at motor: on all samples a.0 is at a bound of the search" in map(str, found.skipped)
 
 
+def test_the_delay_that_a_search_begins_beside_is_no_name_and_not_asked_for_its_numbers() -> None:
+    parameter = Parameter("late.0", "s", 0.1, 0.1, math.inf, 0.1, 10.0, "log")
+    at_bound = Fit((parameter,), {"late.0": 0.1}, np.full((1, 1), 1e-4), 1.0, {}, converged=True)
+
+    class Beside(Table):
+        def polished(self, hypothesis: Hypothesis) -> Hypothesis:
+            return replace(super().polished(hypothesis), fits={("motor",): at_bound})
+
+    table = Beside({("late",): (1e5,), ("late", "b"): (10.0,)})
+    base = table.hypothesis(tuple(effect("late")(BLANK)))
+    found = search(cast(Comparison, table), base, [effect("b")], Criteria(), lambda text: None)
+    assert names(found) == ["b"]
+    assert found.last.names == ("late", "b")
+
+
 def test_a_simpler_form_takes_its_place_once_the_other_effects_are_named() -> None:
     """Alone the richer form stands for a part of b as well; beside b the simpler one leaves as little."""
     left = {
