@@ -7,7 +7,7 @@ its noise. Two other looks do, and both must show the same:
   in a signal moves nothing. A reading that flips between two counts has a variance of a quarter of their
   square, the most that it can have; what a signal may do there unseen follows from what a motion costs at
   least, per acceleration, where it is seen. Records in which that is more than the white noise are used where
-  all are such, as on a drive without a gear, and there are three of them: then the other look decides.
+  no other shows a colour, as on a drive without a gear, and three do: then the other look decides.
 - *What is left of a block* that the signal drives, whatever its numbers are and whichever plain functions of
   the motion it lacks. It bounds the noise from above at the frequencies of the motion.
 
