@@ -227,8 +227,8 @@ def _is_number(cell: str) -> bool:
 
 
 def _since_1970(cell: str) -> float:
-    """Return date and time of day, as loggers write them, in s since 1970; zero where it is none."""
-    with contextlib.suppress(ValueError, OverflowError):
+    """Return date and time of day in s since 1970, in UTC where no zone is stated; zero where it is none."""
+    with contextlib.suppress(ValueError, OverflowError):  # no date, but a number or a word
         stamp = datetime.fromisoformat(cell)
         if ":" in cell:
             return (stamp if stamp.tzinfo else stamp.replace(tzinfo=UTC)).timestamp()

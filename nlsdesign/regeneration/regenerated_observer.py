@@ -419,7 +419,7 @@ def watched_model(
             watched = with_numbers(declared, better.values)
             return watched, _designed(watched, choice), (instead,)
         except NlsError:
-            raise error from None
+            raise error from None  # why the better model has none is the reason to tell
 
 
 def _designed(model: FlatModel, choice: ObserverChoice, grid: Grid | None = None) -> ObserverDesign:
