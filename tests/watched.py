@@ -181,13 +181,22 @@ def use(
     after: Mapping[str, float] | None = None,
     commission_at: float = 0.0,
     record: Path | None = None,
+    current: tuple[int, float, float, int] | None = None,
 ) -> Use:
-    """Let a machine be used; what is not given of the machine is as declared, or as built."""
+    """Let a machine be used; what is not given of the machine is as declared, or as built.
+
+    A current that is given in place of the loop: which, its size in A, its frequency in Hz, whether it is
+    not held.
+    """
     first = dict(built or {})
     numbers = [*values(**first), *values(**first | dict(after or {}))]
     command = [str(program), str(seed), str(seconds), str(change_at), *map(repr, numbers), str(commission_at)]
     done = subprocess.run(
-        [*command, str(record or "")], capture_output=True, text=True, check=True, timeout=36000
+        [*command, str(record or ""), *map(str, current or ())],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=36000,
     )
     time, bits, alarms, judged, usable = done.stdout.split()
     return Use(float(time), int(bits, 16), int(alarms), int(judged), int(usable) / max(int(judged), 1))

@@ -67,7 +67,11 @@ def as_step(source: WatchSource) -> CSource:
 def quick(plan: WatchPlan) -> WatchPlan:
     """Return a monitor that judges every five means, and at once."""
     return replace(
-        plan, between=5.0 * LENGTH * plan.model.sample_time, settling=plan.model.sample_time, least=4.0
+        plan,
+        between=5.0 * LENGTH * plan.model.sample_time,
+        settling=plan.model.sample_time,
+        least=4.0,
+        some=0.0,
     )
 
 

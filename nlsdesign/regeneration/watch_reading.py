@@ -40,6 +40,8 @@ CERTAIN = 0.5
 """Largest standard error of a change that is named, as a share of it."""
 TOO_LITTLE = 2
 """Bit of the monitor's word: of late there was too little to judge by."""
+ONE_MOTION = 32
+"""Bit of the monitor's word: the motion was too much alike, and the machine is not held against itself."""
 TORQUE_CONSTANT = "motor.torque_constant"
 EFFECTS = {
     "friction": "coulomb_friction",
@@ -101,7 +103,7 @@ class WatchVerdict:
     ----------
     verdict
         ``none``, ``named``, ``undecidable`` (several causes would do), ``unknown`` (none does),
-        ``implausible`` (what the numbers would have to be, none is), or ``too_little``.
+        ``implausible`` (what the numbers would have to be, none is), ``too_little``, or ``one_motion``.
     changes
         All numbers that may have changed, the likeliest first.
     probability
@@ -146,6 +148,8 @@ HEADLINES = {
     "unknown": "Something has changed that is no number watched: record some motions and diagnose them.",
     "implausible": "Something has changed, and no number of a machine changes so much: check sign, unit and "
     "scale of each reading, and whether samples are lost or come twice.",
+    "one_motion": "The motion was too much alike to tell a change from what any model lacks: let the machine "
+    "move at several speeds and loads, or call commission and go on with this motion.",
     "too_little": "Too little motion was seen, {means:.0f} means: let the machine be used for some minutes.",
 }
 """What a verdict says in one line."""
@@ -169,6 +173,8 @@ def read_watch(record: np.ndarray[Any, Any], plan: WatchPlan) -> WatchVerdict:
     means, change, base = _estimated(record["bins"], plan)
     if means < plan.least:
         return WatchVerdict("too_little", (), math.nan, means)
+    if int(record["word"]) & ONE_MOTION:
+        return WatchVerdict("one_motion", (), math.nan, means)
     directions = _directions(plan.blocks)
     noticed = {TORQUE_CONSTANT: (0.05, "")}
     for block in plan.blocks[::-1]:

@@ -61,3 +61,14 @@ def test_a_machine_that_is_not_quite_its_deck_is_held_against_itself(watched):
         program, 35, 1200.0, built=built, commission_at=300.0, change_at=900.0, after={"friction": 1.4}
     )
     assert 900.0 < seen.first <= 900.0 + MINUTE
+
+
+def test_one_motion_again_and_again_is_too_little_until_the_machine_is_held_against_itself(watched):
+    """A sine of 3 A at 1.5 Hz, held and not, named damping and delay of the published machine as it is."""
+    _, program, _ = watched
+    for not_held in (0, 1):
+        seen = use(program, 1, 300.0, current=(2, 3.0, 1.5, not_held))
+        assert (seen.alarms, seen.usable) == (0, 0.0)
+    held = use(program, 1, 300.0, current=(2, 3.0, 1.5, 0), commission_at=100.0)
+    assert held.alarms == 0
+    assert held.usable > 0.5

@@ -3,7 +3,9 @@
 
    Arguments: seed, seconds, second of the change, then ten numbers for the machine as built and ten for the machine
    after the change: factors of friction, stiffness, inertia, damping, torque per ampere, relaxation time and weight,
-   friction that goes with the load (share), constant effort (N m), delay of the drive (s). */
+   friction that goes with the load (share), constant effort (N m), delay of the drive (s). Then, for what looks, the
+   second of commissioning and a file; then, for a current that is given in place of the loop, which of `given`, its size
+   (A), its frequency (Hz), and 1 where it runs straight between samples instead of being held. */
 #include <math.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -152,6 +154,23 @@ static void wanted(reach *now, double time, double *goal, double *pace, double *
     *bend = way / (t * t) * 60.0 * x * rest * (1.0 - 2.0 * x);
 }
 
+/* A current that is given: nothing, a sine, levels, noise, or a sine that gets faster for half a minute. */
+static double given(int kind, double size, double frequency, double time)
+{
+    static double level, since = -1e9;
+    const double turn = 6.283185307179586 * frequency, sweep = fmod(time, 30.0);
+    if ((kind == 3 || kind == 4) && time - since >= (kind == 3 ? 1.0 : 0.1) / frequency - 1e-9) {
+        level = size * (2.0 * uniform() - 1.0);
+        since = time;
+    }
+    switch (kind) {
+    case 1: return 0.0;
+    case 2: return size * sin(turn * time);
+    case 5: return size * sin(turn * sweep * (0.05 + sweep / 30.0 * 0.475));
+    default: return level;
+    }
+}
+
 #define MOST_LATE 64 /* steps of the plant by which the drive may be late */
 
 int main(int argc, char **argv)
@@ -177,6 +196,9 @@ int main(int argc, char **argv)
     double late[2 * MOST_LATE] = {0.0}; /* efforts of the last steps, in a ring */
     int newest = 0;
     reach use = {0.0, 0.0, 0.0, 1.0, 0.0};
+    const int kind = argc > 29 ? atoi(argv[26]) : 0;
+    const double size = kind ? atof(argv[27]) : 0.0, frequency = kind ? atof(argv[28]) : 0.0;
+    double next = given(kind, size, frequency, 0.0);
     for (int64_t k = 0; k < samples; ++k) {
         const double *const now = k < change ? built : after;
         if (k == 0 || k == change) {
@@ -192,13 +214,18 @@ int main(int argc, char **argv)
         } else {
             current = current > 0.0 ? LIMIT : -LIMIT;
         }
+        const double rise = kind && atoi(argv[29]) ? (given(kind, size, frequency, (double)(k + 1) * period) - next) : 0.0;
+        if (kind) {
+            current = next;
+            next = given(kind, size, frequency, (double)(k + 1) * period);
+        }
         const reading seen = {read, LOAD_COUNT * floor(load_place / LOAD_COUNT + 0.5),
                               current + CURRENT_NOISE * normal()};
         look((double)k * period, &seen);
         const int ago = (int)(now[DELAY] / STEP + 0.5);
         for (int i = 0; i < steps; ++i) {
             newest = (newest + 1) % (2 * MOST_LATE);
-            late[newest] = PER_AMPERE * now[TORQUE] * current;
+            late[newest] = PER_AMPERE * now[TORQUE] * (current + rise * ((double)i + 0.5) / (double)steps);
             advance(late[(newest + 2 * MOST_LATE - ago) % (2 * MOST_LATE)] + now[OFFSET], now);
         }
     }

@@ -44,8 +44,12 @@ SPEEDS, LOAD, WARM = (5.0, 25.0), 0.1, 35.0
 """Between bins: speeds as multiples of the least one, load as a share of the largest drive, temperature in
 degrees Celsius."""
 BINS = 12
-MISFIT, FIRST_BIT = 16, 8
-"""Bit where more efforts are left than the usual load, and the first bit of a change."""
+KINDS, SOME = 4, 10.0
+"""Bins of speed and load that a varied motion meets at least (2 where there is no dry friction, as speed is
+not divided there), and how many means of each: where one motion repeats, rounding looks like a change."""
+MISFIT, ONE_MOTION, FIRST_BIT = 16, 32, 8
+"""Bits where more efforts are left than the usual load, and where the motion is too much alike; first bit of
+a change."""
 VERSION = 1
 MAGIC = 0x57534C4E  # "NLSW"
 CHECKED = 8  # bytes at the end that the checksum does not cover
@@ -95,6 +99,8 @@ class WatchPlan:
         Time between two judgements, s.
     least
         Means of late that a judgement needs.
+    some
+        Means in a bin from which on its kind of motion was seen.
     unseen
         Numbers of the machine that its readings do not show, so that they are not watched.
     """
@@ -104,6 +110,7 @@ class WatchPlan:
     settling: float
     between: float = PERIOD
     least: float = LEAST
+    some: float = SOME
     unseen: tuple[str, ...] = ()
 
     @property
@@ -222,7 +229,8 @@ def _block_rows(plan: WatchPlan, real: Real, residuals: CSource) -> tuple[list[s
         speeds = ", ".join(real.literal(s) for s in _bounds(block))
         load = real.literal(block.usual_load)
         numbers.append(
-            f"{{{len(block.changes)}u, {first}u, {real.literal(block.least_speed)}, {{{speeds}}}, {load}}},"
+            f"{{{len(block.changes)}u, {first}u, {_kinds(block)}u, {real.literal(block.least_speed)}, "
+            f"{{{speeds}}}, {load}}},"
         )
         cells = [f"outputs.{next(paths)}" for _ in range(len(block.changes) + 3)]
         cells[-3:-3] = [real.literal(0.0)] * (plan.most - len(block.changes))
@@ -244,6 +252,7 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         "ridge": RIDGE,
         "tiny": 1e-30,
         "least": plan.least,
+        "some": plan.some,
         "limit": LIMIT,
         "sure": SURE**2,
         "kept": _kept(plan),
@@ -258,6 +267,7 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
         "most": str(plan.most),
         "pairs": str(pairs),
         "bins": str(BINS),
+        "kinds": str(KINDS),
         "length": str(LENGTH),
         "period": str(plan.period),
         "memory": f"{MEMORY:g}",
@@ -277,6 +287,10 @@ def _values(plan: WatchPlan, real: Real, residuals: CSource) -> dict[str, str | 
 
 def _bounds(block: WatchedBlock) -> tuple[float, float]:
     return SPEEDS[0] * block.least_speed, SPEEDS[1] * block.least_speed
+
+
+def _kinds(block: WatchedBlock) -> int:
+    return KINDS if block.least_speed > 0.0 else 2
 
 
 def _kept(plan: WatchPlan) -> float:
@@ -307,7 +321,7 @@ class WatchTwin:
         self._held: list[Any] = [(0, []) for _ in plan.blocks]
         self._ways = [[0, 0] for _ in plan.blocks]
         self._refused, self._forward, self._fresh = ([first] * len(plan.blocks) for first in (1, 0, 0))
-        self._sample, self._mean_count, self._task, self._found = 0, 0, 0, 0
+        self._sample, self._mean_count, self._task, self._found, self.kinds = 0, 0, 0, 0, 0
         self._pairs = [(i, j) for i in range(plan.most + 1) for j in range(i + 1)]
         self.work: Any = np.zeros((plan.most + 1, plan.most + 1), self._r)
 
@@ -369,7 +383,15 @@ class WatchTwin:
         number, piece = divmod(self._task - 1, each)
         k, recent = len(self.plan.blocks[number].changes), self.record["recent"][number]
         if piece < BINS:
-            _forget(self.record["bins"][number][piece], r(_kept(self.plan)))
+            bins = self.record["bins"][number]
+            # The twin is never commissioned.
+            self.kinds = self.kinds if piece else 0
+            seen = (
+                piece < BINS // 2
+                and bins["count"][piece] + bins["count"][piece + BINS // 2] >= self.plan.some
+            )
+            self.kinds += int(seen)
+            _forget(bins[piece], r(_kept(self.plan)))
         elif piece == BINS:
             for value, (i, j) in zip(recent["products"], self._pairs, strict=True):
                 work[i, j] = work[j, i] = value
@@ -398,6 +420,8 @@ class WatchTwin:
         k, r, work = len(self.plan.blocks[number].changes), self._r, self.work
         if moments["count"] < r(self.plan.least):
             return 2
+        if self.kinds < _kinds(self.plan.blocks[number]):
+            return 2 | ONE_MOTION
         variance, bits = work[-1, -1] / (moments["count"] - r(k)), 0
         for i in range(k):
             change = work[i, -1]
@@ -423,19 +447,27 @@ TEST_PERIODS = 2.2
 def drawn_rows(plan: WatchPlan, count: int) -> list[list[list[float]]]:
     """Return residuals of a machine whose first change of each block is as large as is to be noticed.
 
-    Shape (count, blocks, changes + 3). Whole numbers over a power of two, which C makes again.
+    Shape (count, blocks, changes + 3). Whole numbers over a power of two, which C makes again; speed and load
+    are of another bin in each mean.
     """
     random, rows = 1, []
-    for _ in range(count):
-        row = []
+    for k in range(count):
+        row, turn = [], k // LENGTH
         for block in plan.blocks:
             draws = []
             for _ in block.changes:
                 random = (1664525 * random + 1013904223) & 0xFFFFFFFF
                 draws.append(float((random >> 20) - 2048) / 4096.0)
-            row.append([*draws, draws[0], 1.0 + block.least_speed, draws[0]])
+            speeds, loads = _test_motion(block)
+            row.append([*draws, draws[0], speeds[turn % 3], loads[turn % 2]])
         rows.append(row)
     return rows
+
+
+def _test_motion(block: WatchedBlock) -> tuple[Sequence[float], Sequence[float]]:
+    """Return speeds and loads of the self-test, of each bin one."""
+    speed = block.least_speed or 1.0
+    return [1.5 * speed, 10.0 * speed, 50.0 * speed], [0.5 * block.usual_load, 2.0 * block.usual_load]
 
 
 def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
@@ -451,10 +483,12 @@ def _test_values(plan: WatchPlan, real: Real) -> dict[str, str | list[str]]:
         for k in range(len(block.changes)):
             number = f"(({real})(word >> 20u) - {real.literal(2048.0)}) / {real.literal(4096.0)}"
             drawn += ["word = (1664525u * word) + 1013904223u;", f"given[{first + k}] = {number};"]
+        (slow, middle, fast), (little, much) = (map(real.literal, row) for row in _test_motion(block))
         drawn += [
             f"given[{first + most}] = given[{first}];",
-            f"given[{first + most + 2}] = given[{first}];",
-            f"given[{first + most + 1}] = {real.literal(1.0)} + {real.literal(block.least_speed)};",
+            f"given[{first + most + 1}] = "
+            f"(turn % 3u == 0u) ? {slow} : ((turn % 3u == 1u) ? {middle} : {fast});",
+            f"given[{first + most + 2}] = (turn % 2u == 0u) ? {little} : {much};",
         ]
     return {
         "test_samples": str(count),

@@ -20,6 +20,7 @@ enum { ONE_WAY = 1u, FORWARD = 2u, BACKWARD = 3u };
 typedef struct {
     uint32_t changes; /* how many there are; the rest of a row is zero */
     uint32_t first_bit; /* in the word */
+    uint32_t kinds; /* of motion that it has to see */
     @real@ least_speed; /* below which friction may stick */
     @real@ speeds[2]; /* between bins */
     @real@ load;
@@ -97,13 +98,16 @@ static void sweep(@real@ (*work)[@NAME@_MOST + 1u], uint32_t pivot, uint32_t hal
 }
 
 /* Says which changes are as large as is to be noticed, and surely so. */
-static uint32_t judged(@real@ (*work)[@NAME@_MOST + 1u], const @name@_moments *moments, const block_numbers *block)
+static uint32_t judged(@name@_state *state, const @name@_moments *moments, const block_numbers *block)
 {
+    @real@ (*const work)[@NAME@_MOST + 1u] = state->work;
     const uint32_t changes = block->changes;
     uint32_t word = 0u;
 
     if (moments->count < @least@) {
         word = @NAME@_LITTLE_EVIDENCE;
+    } else if (state->kinds < block->kinds) {
+        word = @NAME@_LITTLE_EVIDENCE | @NAME@_ONE_MOTION;
     } else {
         const @real@ variance = work[@NAME@_MOST][@NAME@_MOST] / (moments->count - (@real@)changes);
 
@@ -130,7 +134,16 @@ static void go_on(@name@_state *state)
     @name@_moments *const recent = &state->record.recent[block];
 
     if (piece < @NAME@_BINS) {
-        forget(&state->record.bins[block][piece], @kept@);
+        @name@_moments *const bin = &state->record.bins[block][piece];
+
+        /* What a model lacks looks like a change where one motion comes again and again, cold or warm. */
+        if (piece == 0u) {
+            state->kinds = state->commissioned;
+        }
+        if (piece < @NAME@_BINS / 2u && bin->count + bin[@NAME@_BINS / 2u].count >= @some@) {
+            ++state->kinds;
+        }
+        forget(bin, @kept@);
     } else if (piece == @NAME@_BINS) {
         fill(state->work, recent, recent->products[@NAME@_PAIRS - 1u]);
     } else if (piece <= @NAME@_BINS + (2u * numbers[block].changes)) {
@@ -138,7 +151,7 @@ static void go_on(@name@_state *state)
 
         sweep(state->work, turn / 2u, turn % 2u);
     } else if (piece == each - 1u) {
-        state->found |= judged(state->work, recent, &numbers[block]);
+        state->found |= judged(state, recent, &numbers[block]);
         forget(recent, @recently@);
         if (block == @NAME@_BLOCKS - 1u) {
             state->record.word = state->found;
@@ -339,6 +352,7 @@ uint32_t @name@_commission(@name@_state *state)
     }
     if (enough != 0u) {
         state->task = 0u;
+        state->commissioned = @kinds@u;
         state->record.word = @NAME@_LITTLE_EVIDENCE;
     }
     return enough;

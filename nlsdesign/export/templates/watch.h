@@ -20,6 +20,7 @@
 #define @NAME@_NOT_USED 0x4u /* this sample: a reading was refused, or the machine stands still */
 #define @NAME@_NOT_STARTED 0x8u /* init was not called */
 #define @NAME@_MISFIT 0x10u /* with CHANGED: more efforts are left than the usual load, and no change takes them away */
+#define @NAME@_ONE_MOTION 0x20u /* with LITTLE_EVIDENCE: the motion of late was too much alike, and commission was not called */
 @names@
 
 /* Sums of products over means that were used. */
@@ -68,6 +69,8 @@ typedef struct {
     uint32_t task; /* of the judgement, 0 where none goes on */
     uint32_t found; /* word of the judgement that goes on */
     uint32_t settling; /* samples until the filters have settled */
+    uint32_t kinds; /* of motion that the block of the judgement has seen */
+    uint32_t commissioned; /* kinds that need not be seen, as the machine is held against itself */
     uint32_t started;
 } @name@_state;
 

@@ -16,6 +16,8 @@ int main(void)
     @name@_init(&state);
     state.settling = 0u;
     for (uint32_t k = 0u; k < @test_samples@u; ++k) {
+        const uint32_t turn = k / @NAME@_LENGTH;
+
         @drawn@
         told = @name@_take(&state, given, 1u, @zero@);
     }

@@ -13,7 +13,7 @@ import nlsdesign as nls
 from nlsdesign.components import smoothed
 from nlsdesign.export import CORTEX_M4F, export_watch, measure_on_target, read_watch_record
 from nlsdesign.export.c.c_text import Real
-from nlsdesign.export.c.watch_code import LENGTH, MISFIT, WatchTwin, drawn_rows
+from nlsdesign.export.c.watch_code import LENGTH, MISFIT, ONE_MOTION, WatchTwin, drawn_rows
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.target_run import missing_emulator
 from nlsdesign.foundation.errors import ExportError
@@ -95,6 +95,19 @@ def test_a_step_costs_at_most_a_thousand_instructions_and_eight_kilobytes(machin
     assert cost.run.instructions.max() <= 1000
     assert cost.flash <= 8192
     assert cost.memory <= 8192
+
+
+def test_what_one_motion_shows_is_no_change(published):
+    """The same rows, of one speed and load or of each in turn."""
+    plan = replace(quick(published), some=2.0)
+    (block,) = plan.blocks
+    for varied, expected in ((False, 2 | ONE_MOTION), (True, 1 | 1 << plan.first_bit(0))):
+        twin = WatchTwin(plan)
+        word = 0
+        for row in drawn_rows(plan, 600):
+            speed_and_load = row[0][-2:] if varied else [2.0 * block.least_speed, block.usual_load]
+            word = twin.take([[*row[0][:-2], *speed_and_load]])
+        assert word & ~4 == expected
 
 
 def test_rows_that_follow_the_first_change_of_each_block_say_so(joint):
@@ -179,6 +192,13 @@ def test_evidence_of_before_is_said_to_be(published):
     assert (old.verdict, old.is_of_before) == ("none", True)
     assert "of the time before" in "".join(old.words())
     assert "of the time before" not in "".join(fresh.words())
+
+
+def test_evidence_of_one_motion_names_nothing(published):
+    (friction,) = [n for n in published.blocks[0].changes if n.endswith(".friction")]
+    verdict = read_watch(evidence(published, {friction: 2.0}, 2 | ONE_MOTION), published)
+    assert (verdict.verdict, verdict.named) == ("one_motion", ())
+    assert "call commission" in "".join(verdict.words())
 
 
 def test_what_is_not_watched_is_known(published):
