@@ -3,8 +3,8 @@
 Each kind is compiled by the compiler of this machine (``cc``, with its undefined-behaviour sanitizer) and
 called with bursts of wild samples, a second of clean ones behind each: not a number, infinities, any finite
 number, jumps, ends of ranges, readings that stand, and time stamps that are late, repeated, stale or run
-over. Beside it runs a twin that sees the clean samples alone: how far apart the estimates are after the second
-is counted. Prints a table; exit status 1 if an output was not finite or a current beyond its range.
+over. Beside it runs a twin that sees the clean samples alone: estimates that are apart after the second are
+counted. Prints a table; exit status 1 if an output was not finite or a current beyond its range.
 """
 
 from __future__ import annotations
@@ -126,9 +126,8 @@ def _limit(value: float | None, none: str) -> str:
 
 
 def counted(name: str, model: FlatModel, samples: int) -> list[int]:
-    """Return samples, those with a flag, outputs that are not finite, and beyond, bursts, and those after whose
-    second the estimate is off by more than 1 % of 5 N·m.
-    """
+    """Return samples, those with a flag, outputs that are not finite or beyond, bursts, and those after which
+    an estimate stays off by more than 1 % of 5 N·m."""
     with tempfile.TemporaryDirectory() as folder:
         source = written(name, model, Path(folder), "float", quick_monitor=False)
         (Path(folder) / "main.c").write_text(program(source, source.model), encoding="utf-8")

@@ -2,6 +2,7 @@
 #ifndef @NAME@_H
 #define @NAME@_H
 
+#include <stddef.h> /* NULL, for init */
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -6,6 +6,7 @@
 #ifndef SCHEDULED_DAMPER_H
 #define SCHEDULED_DAMPER_H
 
+#include <stddef.h> /* NULL, for init */
 #include <stdint.h>
 
 #ifdef __cplusplus

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -12,7 +13,7 @@ from xml.etree import ElementTree
 import pytest
 
 import nlsdesign as nls
-from nlsdesign.export import export_c, write_package
+from nlsdesign.export import CSource, export_c, write_package
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.control import joined
 
@@ -21,8 +22,7 @@ ARDUINO = """
 #include <stdint.h>
 static inline uint32_t micros() { static uint32_t now = 0u; now += 1000u; return now; }
 """
-MAIN = """#include <stddef.h>
-#include "step.h"
+MAIN = """#include "step.h"
 int main(void) { static step_state s; return (int)step_init(&s, NULL); }
 """
 
@@ -168,21 +168,70 @@ int main(int count, char **)
 """
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
-def test_ros2_control_loads_the_loop_as_a_transmission_and_gets_the_numbers_of_the_step(
-    tmp_path: Path,
-) -> None:
+# As installed packages are found: targets alone, for the macro that took names of packages is gone in newer
+# releases of ROS.
+CONFIG = """
+add_library(@name@::@name@ INTERFACE IMPORTED)
+set_target_properties(@name@::@name@ PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "@headers@;@stubs@")
+"""
+AMENT = """
+function(pluginlib_export_plugin_description_file)
+endfunction()
+function(ament_package)
+endfunction()
+"""
+
+
+@pytest.fixture(scope="module")
+def loop(tmp_path_factory: pytest.TempPathFactory) -> tuple[CSource, Path]:
+    folder = tmp_path_factory.mktemp("loop")
     plant = nls.flatten(nls.declare(nls.load_deck("austin2015_figure_consistent")))
     observer = nls.design_observer(plant, gain=nls.observer.CascadeGain())
-    source = export_c(joined(observer, nls.torque_controller(plant)), tmp_path / "c", name="loop")
-    library = tmp_path / "library"
-    write_package(source, library)
+    source = export_c(joined(observer, nls.torque_controller(plant)), folder / "c", name="loop")
+    write_package(source, folder / "library")
+    (folder / "pluginlib").mkdir()
+    (folder / "pluginlib" / "class_list_macros.hpp").write_text(PLUGINLIB)
+    return source, folder / "library"
+
+
+def test_a_step_divides_by_no_constant_and_asks_nothing_twice(loop: tuple[CSource, Path]) -> None:
+    """Sixteen divisions by constants, 14 cycles each, and one range asked for twice were counted once."""
+    text = loop[0].source.read_text(encoding="utf-8")
+    assert re.findall(r"/ \(?[0-9][0-9.e+-]*f?\b", re.sub(r"/\*.*?\*/", "", text, flags=re.S)) == []
+    asked = re.findall(r"\(([^()]*\|\|[^()]*)\)", text)
+    assert asked
+    for question in asked:
+        clauses = [clause.strip() for clause in question.split("||")]
+        assert len(set(clauses)) == len(clauses)
+
+
+@pytest.mark.skipif(
+    shutil.which("cmake") is None or shutil.which("g++") is None, reason="no cmake, or no g++"
+)
+def test_the_package_of_ros2_control_builds_with_targets_of_installed_packages(
+    loop: tuple[CSource, Path], tmp_path: Path
+) -> None:
+    _, library = loop
+    for name in ("ament_cmake", "hardware_interface", "pluginlib", "transmission_interface"):
+        text = AMENT if name == "ament_cmake" else CONFIG.replace("@name@", name)
+        text = text.replace("@headers@", str(HEADERS)).replace("@stubs@", str(library.parent))
+        (tmp_path / f"{name}-config.cmake").write_text(text)
+    ran("cmake", "-S", library / "ros2_control", "-B", tmp_path / "build", f"-DCMAKE_PREFIX_PATH={tmp_path}",
+        *(f"-D{name}_DIR={tmp_path}" for name in ("ament_cmake", "hardware_interface", "pluginlib",
+                                                   "transmission_interface")))  # fmt: skip
+    ran("cmake", "--build", tmp_path / "build")
+    assert list((tmp_path / "build").glob("libloop_ros2.*"))
+
+
+@pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")
+def test_ros2_control_loads_the_loop_as_a_transmission_and_gets_the_numbers_of_the_step(
+    loop: tuple[CSource, Path], tmp_path: Path
+) -> None:
+    source, library = loop
     ros = library / "ros2_control"
-    (tmp_path / "pluginlib").mkdir()
-    (tmp_path / "pluginlib" / "class_list_macros.hpp").write_text(PLUGINLIB)
     (tmp_path / "main.cpp").write_text(CONTROLLER_MANAGER)
     ran("gcc", "-std=c99", "-O2", "-ffp-contract=off", "-c", source.source, "-o", tmp_path / "loop.o")
-    includes = [f"-I{folder}" for folder in (tmp_path, ros, library / "src", HEADERS)]
+    includes = [f"-I{folder}" for folder in (library.parent, ros, library / "src", HEADERS)]
     ran("g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", *includes, tmp_path / "main.cpp",
         tmp_path / "loop.o", "-lm", "-o", tmp_path / "main")  # fmt: skip
     given = [(4.0 * (0.4 * math.sin(0.02 * k) - 0.25), math.sin(0.03 * k)) for k in range(200)]
