@@ -321,10 +321,16 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
         for letter, group in ((_MISSED, gap), (_DERIVED, numbers))
     ]
     tables, statements = c.equation_lines(function, further, targets)
-    ranges = dict.fromkeys(
-        (c.arguments[table.argument], *map(real.literal, table.ends)) for table in c.model.tables
+    # Of tables over one argument the narrowest, which others may miss by a rounding.
+    ranges = {
+        table.argument: [t.ends for t in c.model.tables if t.argument == table.argument]
+        for table in c.model.tables
+    }
+    beyond = " || ".join(
+        f"{c.arguments[name]} < {real.literal(max(e[0] for e in ends))} || "
+        f"{c.arguments[name]} > {real.literal(min(e[1] for e in ends))}"
+        for name, ends in ranges.items()
     )
-    beyond = " || ".join(f"{argument} < {first} || {argument} > {last}" for argument, first, last in ranges)
     flag = [f"status |= ({beyond}) ? {c.name.upper()}_OUT_OF_TABLE : 0u;"] if beyond else []
     missed, derived = (sorted(named_indices(statements, letter)) for letter in (_MISSED, _DERIVED))
     one, zero = real.literal(1.0), real.literal(0.0)
