@@ -322,14 +322,12 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
     ]
     tables, statements = c.equation_lines(function, further, targets)
     # Of tables over one argument the narrowest, which others may miss by a rounding.
-    ranges = {
-        table.argument: [t.ends for t in c.model.tables if t.argument == table.argument]
-        for table in c.model.tables
-    }
+    ranges: dict[str, list[tuple[float, float]]] = {}
+    for table in c.model.tables:
+        ranges.setdefault(c.arguments[table.argument], []).append(table.ends)
     beyond = " || ".join(
-        f"{c.arguments[name]} < {real.literal(max(e[0] for e in ends))} || "
-        f"{c.arguments[name]} > {real.literal(min(e[1] for e in ends))}"
-        for name, ends in ranges.items()
+        f"{a} < {real.literal(max(ends)[0])} || {a} > {real.literal(min(last for _, last in ends))}"
+        for a, ends in ranges.items()
     )
     flag = [f"status |= ({beyond}) ? {c.name.upper()}_OUT_OF_TABLE : 0u;"] if beyond else []
     missed, derived = (sorted(named_indices(statements, letter)) for letter in (_MISSED, _DERIVED))
