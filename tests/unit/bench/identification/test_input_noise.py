@@ -46,18 +46,20 @@ def turned(
     ripple: float = 0.0,
     count: float = 1e-5,
     frequencies: Sequence[float] = (0.7, 1.6),
+    white: str = "",
 ) -> tuple[Bench, Array]:
     """Some records with noise in the torque, ``slow`` of it remembered; with the noise of the first.
 
     ``beside_reversals``: by how much more there is where the body is slow. ``ripple``: torque over the angle.
+    ``white``: name of a record with white noise alone.
     """
     draw, time, records, noises = np.random.default_rng(7), STEP * np.arange(COUNT), [], []
-    for name, frequency in zip(("slow", "quick", "between"), frequencies, strict=False):
+    for name, frequency in zip(("slow", "quick", "between", "creeping"), frequencies, strict=False):
         pace = 2.0 * np.pi * frequency
         angle, rate = np.sin(pace * time), pace * np.cos(pace * time)
         remembered = first_order_noise(COUNT, memory / STEP, draw)
         remembered *= 1.0 + beside_reversals * (np.abs(rate) < 0.4 * pace)
-        noise = WHITE * draw.standard_normal(COUNT) + slow * remembered
+        noise = WHITE * draw.standard_normal(COUNT) + (name != white) * slow * remembered
         torque = -0.01 * pace**2 * angle + 0.05 * rate + ripple * np.sin(9.0 * angle) + noise
         rows = (count * np.round(angle / count), torque)
         records.append(Record(name, Trace(time, dict(zip(UNITS, rows, strict=True)), UNITS, name)))
@@ -122,6 +124,14 @@ def test_where_counts_may_hide_it_in_all_of_three_records_what_the_balance_leave
     assert bench.noise.deviation("ball.torque") == pytest.approx(float(np.hypot(WHITE, SLOW)), rel=0.15)
     bench, _ = turned(SLOW, count=COARSE, frequencies=three, ripple=0.2)
     assert bench.noise.evidence["ball.torque"] == "white only", "what goes with the motion is no noise"
+
+
+@pytest.mark.parametrize(("white", "shown"), [("", "above motion"), ("creeping", "white only")])
+def test_a_record_whose_counts_hide_nothing_and_that_is_white_outweighs_three_that_may_hide(
+    white: str, shown: str
+) -> None:
+    bench, _ = turned(SLOW, count=COARSE, frequencies=(0.7, 1.6, 1.1, 0.08), white=white)
+    assert bench.noise.evidence["ball.torque"] == shown
 
 
 @pytest.mark.long_cases("screw_carriage", "belt_axis")
