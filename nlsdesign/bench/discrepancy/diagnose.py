@@ -130,6 +130,10 @@ def diagnose(
         turned = answer.case.read_in_turn(effects, progress)
         anew = _answer_anew(turned, effects, progress) if turned is not None else answer
         answer = answer if anew.leaves_something else anew
+    if answer.leaves_something and (noisy := answer.case.read_with_noise_beside(answer.outcome)):
+        progress("judging by the noise of inputs that shows beside what was found")
+        anew = _answer_anew(noisy, effects, progress)
+        answer = answer if anew.leaves_something else anew
     progress("reading the held-out records")
     return _verdict(answer, records)
 
@@ -217,6 +221,16 @@ class _Case:
                 return self._shifted(signal, early, outcome.last)
         return None
 
+    def read_with_noise_beside(self, outcome: Outcome) -> _Case | None:
+        """Return the case with inputs whose noise has the colour that what was named leaves, if it shows one.
+
+        What is missing goes with the motion and hides it at first: then noise counts as white.
+        """
+        if not outcome.steps:
+            return None
+        bench = self.bench.coloured_beside(self._blocks(outcome.last.fitted))
+        return self._on(bench) if bench is not None else None
+
     def _delayed(self) -> list[_Delayed]:
         """Return each motion that may be shifted, the case in which it is read too early, and its delay.
 
@@ -275,7 +289,9 @@ class _Case:
         return self._with_records(records)
 
     def _with_records(self, records: RecordSet) -> _Case:
-        bench = self.bench.read_otherwise(records)
+        return self._on(self.bench.read_otherwise(records))
+
+    def _on(self, bench: Bench) -> _Case:
         sizes = typical_sizes(self.actuator, bench.records)
         return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
 

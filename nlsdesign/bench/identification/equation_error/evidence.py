@@ -245,6 +245,7 @@ class Bench:
             self.noise = self.noise.read_as(self.records)
             read = noise_of_blocks(blocks, self.records, self.noise, chosen)
         self.block_noise = read
+        self._as_read = self.records, read
         sparse = tuple(
             Finding(
                 f"block '{name}'",
@@ -280,6 +281,24 @@ class Bench:
         """Return the same records, read otherwise between their samples, behind the filters chosen here."""
         filters = {name: each.filters for name, each in self._as_measured[1].items()}
         return Bench(records, self._blocks, filters=filters)
+
+    def coloured_beside(self, blocks: Sequence[Block]) -> Bench | None:
+        """Return the same records with the colour of inputs that a better model leaves; nothing if it shows none.
+
+        ``blocks``: of that model, with the names of the declared ones.
+        """
+        records, read = self._as_read
+        asked = [read[block.name].read_by(block) for block in blocks if block.name in read]
+        noise = with_colour_of_inputs(self.noise, records, asked)
+        if noise is self.noise:
+            return None
+        return Bench(
+            replace(records, remarks=self._remarks),
+            self._blocks,
+            noise=noise,
+            filters={name: each.filters for name, each in read.items()},
+            sampling={c.signal: c.sampling for c in records.columns if c.sampling},
+        )
 
     def inferred(self, blocks: Sequence[Block], missing: Missing = plain_terms) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.

@@ -16,7 +16,7 @@ from nlsdesign.bench.identification.equation_error import input_noise
 from nlsdesign.bench.identification.equation_error import noise as channel_noise
 from nlsdesign.bench.identification.equation_error.evidence import Bench
 from nlsdesign.bench.identification.records.mapping import Column
-from nlsdesign.components import ROTATION, Assembly, Dashpot, Encoder, Inertia, tie
+from nlsdesign.components import ROTATION, Assembly, Dashpot, Element, Encoder, Inertia, TorqueRipple, tie
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.model import flatten
@@ -29,12 +29,14 @@ COARSE = 4e-3
 """Counts behind which a torque as large as the white noise may turn the body unseen."""
 UNITS = {"encoder.reading": "rad", "ball.torque": "N*m"}
 
+LOSS = Dashpot(damping=0.05, domain=ROTATION)
 
-def machine() -> Assembly:
-    """A body that is turned by a measured torque."""
-    numbers = tie(Dashpot(damping=0.05, domain=ROTATION), "ball")
+
+def machine(**more: Element) -> Assembly:
+    """A body that is turned by a measured torque, with more parts at it."""
+    ties = {name: tie(part, "ball") for name, part in {"loss": LOSS, **more}.items()}
     return assembly(
-        "machine", ball=Inertia(inertia=0.01), loss=numbers, encoder=Encoder(of="ball.angle", quantum=1e-5)
+        "machine", ball=Inertia(inertia=0.01), **ties, encoder=Encoder(of="ball.angle", quantum=1e-5)
     )
 
 
@@ -110,6 +112,20 @@ def test_what_is_no_noise_is_not_taken_for_it(
     assert turned(**what)[0].noise.evidence["ball.torque"] == "white only"
     monkeypatch.setattr(channel_noise if clause == "_CONTRADICTED" else input_noise, clause, no_clause)
     assert turned(**what)[0].noise.evidence["ball.torque"] == "above motion", "this clause decides"
+
+
+@pytest.mark.parametrize(("order", "shown"), [(9.0, True), (4.0, False)])
+def test_what_goes_with_the_motion_hides_a_colour_until_it_is_in_the_model(order: float, shown: bool) -> None:
+    bench, noise = turned(SLOW, ripple=0.2)
+    ripple = TorqueRipple(domain=ROTATION, sine=0.2, cosine=0.0, order=order)
+    assert bench.coloured_beside(blocks_of(flatten(machine()), tuple(UNITS))) is None
+    beside = bench.coloured_beside(blocks_of(flatten(machine(ripple=ripple)), tuple(UNITS)))
+    assert (beside is not None) == shown
+    if beside is not None:
+        assert beside.noise.evidence["ball.torque"] == "above motion"
+        assert beside.noise.deviation("ball.torque") == pytest.approx(float(np.std(noise)), rel=0.15)
+        before, after = (each.block_noise["ball"].floors["slow"] for each in (bench, beside))
+        assert float(np.median(after.sigma)) > 1.5 * float(np.median(before.sigma))
 
 
 def test_counts_that_hide_what_a_torque_does_show_no_colour() -> None:
