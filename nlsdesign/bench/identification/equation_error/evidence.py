@@ -283,7 +283,7 @@ class Bench:
         return Bench(records, self._blocks, filters=filters)
 
     def coloured_beside(self, blocks: Sequence[Block]) -> Bench | None:
-        """Return the same records with the colour of inputs that a better model leaves; nothing if it shows none.
+        """Return the same records with the colour of inputs that a better model leaves, if it shows one.
 
         ``blocks``: of that model, with the names of the declared ones.
         """
