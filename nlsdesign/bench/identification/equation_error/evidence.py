@@ -252,7 +252,7 @@ class Bench:
                 f"is judged on rows with {100.0 * share:.0f} % of the power of its motion: elsewhere a "
                 "reversal or a rest is within reach of its filter; sample faster, or reverse less often",
             )
-            for name, share in self.covered().items()
+            for name, share in covered(self).items()
             if share < _SPARSE
         )
         self.records = replace(self.records, remarks=(*self.records.remarks, *sparse))
@@ -377,15 +377,6 @@ class Bench:
                 result.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
         return result
 
-    def covered(self) -> dict[str, float]:
-        """Return by block the share of the power of its motion in the rows of the records that decide."""
-        deciding = {record.name for record in self.records.deciding}
-        shares = {
-            block: [floor.covered for record, floor in read.floors.items() if record in deciding]
-            for block, read in self.block_noise.items()
-        }
-        return {block: float(np.mean(each)) for block, each in shares.items() if each}
-
     def slowest(self) -> dict[str, float]:
         """Return the least speed that some record resolves, by the measured signal that it is the rate of."""
         speeds: dict[str, float] = {}
@@ -423,3 +414,13 @@ class Bench:
                 masked = {n: m[::k] for n, m in masked.items()}
             self._thin[key] = replace(record, trace=trace, masked=masked), NoiseFloor(one[counted], raw, raw)
         return self._thin[key]
+
+
+def covered(bench: Bench) -> dict[str, float]:
+    """Return by block the share of the power of its motion in the rows of the records that decide."""
+    deciding = {record.name for record in bench.records.deciding}
+    shares = {
+        block: [floor.covered for record, floor in read.floors.items() if record in deciding]
+        for block, read in bench.block_noise.items()
+    }
+    return {block: float(np.mean(each)) for block, each in shares.items() if each}

@@ -163,7 +163,13 @@ def test_a_clean_machine_whose_current_has_a_colour_gets_no_name(kind: str, tmp_
 def test_two_names_are_sure_once_the_noise_beside_them_is_read(tmp_path: Path) -> None:
     """With white noise alone something without a name was left, and the delay had a probability of a half."""
     write_kind_case(
-        tmp_path, "geared_joint", ("drive_delay", "coulomb_friction"), 1.0, 1457, condition="coloured", says_held=True
+        tmp_path,
+        "geared_joint",
+        ("drive_delay", "coulomb_friction"),
+        1.0,
+        1457,
+        condition="coloured",
+        says_held=True,
     )
     verdict = diagnose(*opened(tmp_path))
     assert {effect.name for effect in verdict.effects} == {"drive_delay", "coulomb_friction"}
