@@ -68,6 +68,7 @@ EXCEPTIONS: dict[str, tuple[str, ...]] = {
     "bench.calibration": (ASSEMBLY,),
     "bench.calibration.bench_test": ("components",),
     "bench.calibration.calibrated_deck": ("components.assembly.deck_writer",),
+    "bench.discrepancy.case": ("components",),
     "bench.discrepancy.diagnose": ("components",),
 }
 
@@ -81,7 +82,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     ),
     "bench.discrepancy": (
         {"tearing"}, {"block_prediction"}, {"fitting"}, {"effects"}, {"selection"}, {"screening", "planning"},
-        {"reporting"}, {"diagnose"},
+        {"reporting"}, {"case"}, {"diagnose"},
     ),
     "design": ({"curves"}, {"statics"}, {"tolerance", "drawing"}, {"optimisation"}, {"parametric"}, {"jobs"}),
     "feedback.observer": ({"scheduling"}, {"corrected", "certificates"}, {"spread"}),

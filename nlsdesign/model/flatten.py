@@ -1,7 +1,8 @@
 """From an assembly to the flat model; the only place that walks the tree to write equations.
 
-Names are declared in written order in a first walk; equations are taken in a second. So the order of the
-vectors is that of the deck, whatever the order in which laws happen to ask for their symbols.
+Parameters are declared in written order in a first walk; equations are taken in a second, and states, inputs
+and signals sorted into that order. So the order of the vectors is that of the deck, whatever the order in
+which laws happen to ask for their symbols.
 """
 
 from __future__ import annotations

@@ -12,10 +12,10 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal, NamedTuple, Protocol, TypeAlias
+from typing import Any, Literal, NamedTuple, Protocol
 
 from ...components import Assembly
 from ...components.assembly.deck_writer import write_deck
@@ -23,16 +23,14 @@ from ...foundation.errors import ConvergenceError, MeasurementError
 from ...foundation.text_files import discard, make_folder, write_text
 from ...model import flatten
 from ...model.origin import derived
-from ..identification.equation_error.block import Block
 from ..identification.equation_error.block_noise import LEAST_COVERED
-from ..identification.equation_error.evidence import Bench
-from ..identification.equation_error.inferred_sampling import Missing, no_terms, plain_terms
+from ..identification.equation_error.evidence import Bench, covered
 from ..identification.least_squares import Fit
 from ..identification.records.measurement import RecordSet
+from .case import Case, case_of
 from .effects import Candidate
 from .effects import catalogue as known_effects
 from .effects.effect import EffectFunction
-from .effects.sensing import delays
 from .fitting import Key
 from .planning.experiment import Experiment, next_experiment, write_command
 from .reporting.advice import advice, more_excitation, where_they_differ
@@ -41,7 +39,7 @@ from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
 from .screening.causality import lagging_forces, modes_too_quick
-from .screening.scale_and_sign import drive_findings, scale_findings, typical_sizes
+from .screening.scale_and_sign import drive_findings, scale_findings
 from .screening.wrong_numbers import (
     far_numbers,
     is_explained_by_numbers,
@@ -52,8 +50,8 @@ from .screening.wrong_numbers import (
     wrong_numbers,
 )
 from .selection.comparison import Comparison
-from .selection.criteria import CALIBRATION, Change, Criteria, is_complete
-from .selection.hypothesis import Hypothesis, excesses
+from .selection.criteria import CALIBRATION, Criteria, is_complete
+from .selection.hypothesis import Hypothesis
 from .selection.measures import DECLARED, Excess, Excesses, Standing, standing_of
 from .selection.search import Outcome, search, with_what_has_no_name
 from .selection.trials import Step
@@ -116,12 +114,11 @@ def diagnose(
     too_quick = modes_too_quick(actuator, max(record.step for record in records.records))
     records = replace(records, remarks=(*records.remarks, *too_quick))
     chosen_by = records.without_held_out()
-    bench = Bench(chosen_by, blocks_of(flatten(actuator), records.signals))
-    case = _Case(actuator, bench, Comparison(bench, typical_sizes(actuator, bench.records)), criteria)
+    case = case_of(actuator, Bench(chosen_by, blocks_of(flatten(actuator), records.signals)), criteria)
     case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
     answer = _Answer(case, base, *_decided(case, base, effects, progress))
-    other = answer.case.read_as_inferred_beside(answer.outcome, answer.decision)
+    other = answer.case.read_as_inferred_beside(answer.outcome, answer.decision.verdict)
     if other is not None:
         progress("reading inputs between their samples as they run beside what was found")
         anew = _answer_anew(other, effects, progress)
@@ -130,163 +127,18 @@ def diagnose(
         turned = answer.case.read_in_turn(effects, progress)
         anew = _answer_anew(turned, effects, progress) if turned is not None else answer
         answer = answer if anew.leaves_something else anew
+    if answer.leaves_something and (noisy := answer.case.read_with_noise_beside(answer.outcome)):
+        progress("judging by the noise of inputs that shows beside what was found")
+        anew = _answer_anew(noisy, effects, progress)
+        answer = answer if anew.leaves_something else anew
     progress("reading the held-out records")
     return _verdict(answer, records)
-
-
-_EARLY = 1.2
-"""Samples by which a motion is read too early where its delay is looked for: more than a shift can be."""
-_SAME_SAMPLING = 0.1
-"""Samples by which an input may be read otherwise without a second look at everything."""
-
-
-_Delayed: TypeAlias = "tuple[str, _Case, Hypothesis]"
-"""A motion, the case in which it is read too early, and its delay fitted."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Case:
-    """What a decision rests on: the declared assembly, the records that choose, and the rule."""
-
-    actuator: Assembly
-    bench: Bench
-    comparison: Comparison
-    criteria: Criteria
-    settled: bool = False  # whether inputs are read as they run beside what was found already
-    begun: list[_Delayed] = field(default_factory=list, repr=False)  # what _delayed gives, once it was asked
-
-    def excesses(self, hypothesis: Hypothesis) -> Excesses:
-        """Return the excess of each block on all samples."""
-        return excesses(hypothesis, self.bench, self.criteria)
-
-    def read_as_declared(self, base: Hypothesis) -> tuple[_Case, Hypothesis]:
-        """Return the case and its fit, with inputs read between their samples as the declared machine asks.
-
-        Where it then leaves nothing, it lacks nothing: what a shift within a sample explains is no effect. It
-        must explain as much of each block as effects must. Else both stay as they are.
-        """
-        before = self.excesses(base)
-        if _leaves_nothing(before):
-            return self, base
-        for other in self._readings_of_declared():
-            again = other.comparison.base(self.actuator)
-            after = other.excesses(again)
-            least = min(Change(self.criteria, before, after).shares.values(), default=1.0)
-            if _leaves_nothing(after) and least >= self.criteria.closed_share:
-                return other, again
-        return self, base
-
-    def _readings_of_declared(self) -> Iterator[_Case]:
-        """Yield the case as the declared machine asks, and with a motion shifted if that leaves nothing."""
-        other = self._read_as(self.bench.inferred(self._blocks(self.actuator), no_terms), 0.0)
-        if other is not None:
-            yield other
-        for signal, early, beside in self._delayed():
-            closes = _leaves_nothing(early.excesses(beside))
-            if closes and (shifted := self._shifted(signal, early, beside)) is not None:
-                yield shifted
-
-    def read_as_inferred_beside(self, outcome: Outcome, decision: _Decision) -> _Case | None:
-        """Return the case with inputs read between their samples as records tell it beside what was found.
-
-        Backlash that nobody declared, for instance, hides at first that a current is held. Where what was
-        named leaves no block open, it is asked as if nothing were missing: plain terms would hide a shift.
-        Where nothing may be named, it is asked so beside the best that closes every block: inputs that are
-        read half a sample early spoil the quickest record, and a right name with it. Nothing is returned
-        where the inputs are read so already.
-        """
-        if outcome.steps:
-            return self._read_beside(outcome.last, no_terms if outcome.complete else plain_terms)
-        if decision.verdict not in ("unknown", "undecidable"):
-            return None
-        fitted = (each.hypothesis for each in outcome.tried)
-        closing = next((each for each in fitted if is_complete(self.excesses(each))), None)
-        return self._read_beside(closing, no_terms) if closing else None
-
-    def read_in_turn(
-        self, effects: Sequence[EffectFunction], progress: Callable[[str], None]
-    ) -> _Case | None:
-        """Return the case with a motion read as much earlier or later as leaves nothing, if there is one.
-
-        Effects are searched for beside a delay of that motion.
-        """
-        for signal, early, beside in self._delayed():
-            progress(f"looking for effects beside a shift of {signal}")
-            outcome = search(early.comparison, beside, effects, self.criteria, progress)
-            if outcome.complete:
-                return self._shifted(signal, early, outcome.last)
-        return None
-
-    def _delayed(self) -> list[_Delayed]:
-        """Return each motion that may be shifted, the case in which it is read too early, and its delay.
-
-        It is read earlier than two channels of one recorder can be shifted, so that what is left is a delay.
-        The hold of an input is told beside it: alone each would take from the other.
-        """
-        for signal in () if self.begun else self.bench.shiftable:
-            delay = next((c for c in delays(self.actuator) if f"{c.location}.reading" == signal), None)
-            cases = (
-                self._with_records(self.bench.shifted(signal, _EARLY, form)) for form in self.bench.forms
-            )
-            begun = [(case, case._beginning_with(delay)) for case in cases if delay]
-            fitted = [(case, beside) for case, beside in begun if beside is not None]
-            if not (delay and fitted):
-                continue
-            early, beside = min(
-                fitted, key=lambda each: sum(e.chi2 for e in each[0].excesses(each[1]).values())
-            )
-            read = early.bench.inferred(self._blocks(sourced(beside)), no_terms)
-            other = early._read_as(read, _SAME_SAMPLING)
-            again = other._beginning_with(delay) if other else None
-            self.begun.append((signal, other, again) if other and again else (signal, early, beside))
-        return self.begun
-
-    def _beginning_with(self, candidate: Candidate) -> Hypothesis | None:
-        return self.comparison.with_effect(self.comparison.base(self.actuator), candidate)
-
-    def _shifted(self, signal: str, early: _Case, beside: Hypothesis) -> _Case | None:
-        """Return the case with a motion read as late as its delay says, beyond how early it was read."""
-        step = min(record.step for record in self.bench.records.records)
-        late = _EARLY - beside.values[beside.added[0].unknowns[0].name] / step
-        return self._with_records(early.bench.shifted(signal, late)) if abs(late) > _SAME_SAMPLING else None
-
-    def is_read_otherwise_beside(self, hypothesis: Hypothesis) -> bool:
-        """Tell whether inputs run otherwise beside what is named so far than they were read.
-
-        Then what a block still lacks is that shift before it is an effect. It is not asked beside a lag,
-        which may stand for the shift itself.
-        """
-        if self.settled or hypothesis.newest.explains_lag:
-            return False
-        return self._read_beside(hypothesis, plain_terms) is not None
-
-    def _read_beside(self, hypothesis: Hypothesis, lacks: Missing) -> _Case | None:
-        return self._read_as(self.bench.inferred(self._blocks(hypothesis.fitted), lacks), _SAME_SAMPLING)
-
-    def _read_as(self, records: RecordSet, least: float) -> _Case | None:
-        """Return the case with inputs read otherwise; nothing where none moves by more samples than that."""
-        moved = (
-            abs(now.sampling.late - then.sampling.late)
-            for then, now in zip(self.bench.records.columns, records.columns, strict=True)
-            if then.sampling and now.sampling
-        )
-        if max(moved, default=0.0) <= least:
-            return None
-        return self._with_records(records)
-
-    def _with_records(self, records: RecordSet) -> _Case:
-        bench = self.bench.read_otherwise(records)
-        sizes = typical_sizes(self.actuator, bench.records)
-        return _Case(self.actuator, bench, Comparison(bench, sizes), self.criteria)
-
-    def _blocks(self, assembly: Assembly) -> Sequence[Block]:
-        return blocks_of(flatten(assembly), self.bench.records.signals)
 
 
 class _Answer(NamedTuple):
     """What was decided, and what it rests on: the case and the fit of the declared machine."""
 
-    case: _Case
+    case: Case
     base: Hypothesis
     outcome: Outcome
     decision: _Decision
@@ -297,22 +149,15 @@ class _Answer(NamedTuple):
         return not self.outcome.complete and self.decision.verdict in ("named", "unknown", "undecidable")
 
 
-def _answer_anew(
-    case: _Case, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
-) -> _Answer:
+def _answer_anew(case: Case, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]) -> _Answer:
     """Return the answer of records that are read otherwise, as they run beside what was found before."""
     case = replace(case, settled=True)
     base = case.comparison.base(case.actuator)
     return _Answer(case, base, *_decided(case, base, catalogue, progress))
 
 
-def _leaves_nothing(left: Excesses) -> bool:
-    """Tell whether no block and no declared number is open."""
-    return not any(each.open for each in left.values())
-
-
 def _decided(
-    case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+    case: Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
 ) -> tuple[Outcome, _Decision]:
     records = case.bench.records
     findings = [
@@ -334,7 +179,7 @@ def _decided(
 
 
 def _searched(
-    case: _Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+    case: Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
 ) -> Outcome:
     """Search for effects, and for declared numbers that the records contradict."""
     free = with_numbers_let_go(case.comparison, base, case.criteria)
@@ -362,7 +207,7 @@ def _searched(
     return replace(outcome, last=free, steps=()) if numbers and explains else outcome
 
 
-def _with_fewer_effects(case: _Case, outcome: Outcome) -> Outcome | None:
+def _with_fewer_effects(case: Case, outcome: Outcome) -> Outcome | None:
     """Return the first of the effects beside wrong numbers, if these leave nothing and need fewer numbers."""
     for count, step in enumerate(outcome.steps, 1):
         present = outcome.last if count == len(outcome.steps) else case.comparison.polished(step.chosen)
@@ -374,7 +219,7 @@ def _with_fewer_effects(case: _Case, outcome: Outcome) -> Outcome | None:
     return None
 
 
-def _decision(case: _Case, base: Hypothesis, outcome: Outcome) -> _Decision:
+def _decision(case: Case, base: Hypothesis, outcome: Outcome) -> _Decision:
     """Return what is missing, unless other numbers of the rig explain the records better."""
     verdict: Literal["none", "named", "unknown", "undecidable"]
     wrong = sentence_of(outcome.last)
@@ -410,7 +255,7 @@ def _verdict(answer: _Answer, records: RecordSet) -> Verdict:
     # proposed for the values of a table that has no name.
     judged = better = better.as_written()
     left, known = case.excesses(judged), tuple(judged.fits.values())
-    complete = is_complete(left) and min(case.bench.covered().values(), default=0.0) >= LEAST_COVERED
+    complete = is_complete(left) and min(covered(case.bench).values(), default=0.0) >= LEAST_COVERED
     if verdict in ("named", "unknown", "undecidable"):
         better = with_what_has_no_name(case.comparison, better, case.criteria).as_written()
     before, after = case.excesses(base), case.excesses(better)
@@ -453,7 +298,7 @@ def _verdict(answer: _Answer, records: RecordSet) -> Verdict:
     )
 
 
-def _experiment(case: _Case, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Experiment | None:
+def _experiment(case: Case, base: Hypothesis, outcome: Outcome, decision: _Decision) -> Experiment | None:
     """Return the record that would tell apart what these records do not."""
     rivals: tuple[Hypothesis, ...] = ()
     if decision.verdict == "named":

@@ -4,7 +4,7 @@ Everything here is a function of numbers. For each block and record they are sum
 units of the noise floor, *predicted*: with numbers that come from other pieces of the records, see
 :mod:`.cross_validation`. Records with the role ``held_out`` are not among them. The *excess* of a block is
 what its sum has beyond the number of residuals, which is what noise alone would leave. The rule in prose is
-``docs/decision.md``.
+``docs/decision.md``, whose section 2 has these four as its eight clauses.
 
 An effect may be named if
  1. it explains a share of the excess that is left in some open block, and more than noise explains;

@@ -137,8 +137,8 @@ def block_noise(block: Block, records: RecordSet, noise: Noise, filters: Filters
     if hidden > _HIDDEN * (whole + 0.1**-2):  # a number that is declared to 10 % says as much
         raise MeasurementError(
             f"block '{block.name}'",
-            f"{100.0 * hidden / whole:.0f} % of the power of its acceleration is noise: it hides an inertia",
-            next_step="record a motion of more counts or of higher frequency, or take a finer encoder",
+            f"{100.0 * hidden / max(hidden, whole):.0f} % of the power of its acceleration is noise",
+            next_step="to see an inertia, record more counts or a higher frequency, or take a finer encoder",
         )
     return BlockNoise(block, filters, floors)
 

@@ -245,13 +245,14 @@ class Bench:
             self.noise = self.noise.read_as(self.records)
             read = noise_of_blocks(blocks, self.records, self.noise, chosen)
         self.block_noise = read
+        self._as_read = self.records, read
         sparse = tuple(
             Finding(
                 f"block '{name}'",
                 f"is judged on rows with {100.0 * share:.0f} % of the power of its motion: elsewhere a "
                 "reversal or a rest is within reach of its filter; sample faster, or reverse less often",
             )
-            for name, share in self.covered().items()
+            for name, share in covered(self).items()
             if share < _SPARSE
         )
         self.records = replace(self.records, remarks=(*self.records.remarks, *sparse))
@@ -280,6 +281,24 @@ class Bench:
         """Return the same records, read otherwise between their samples, behind the filters chosen here."""
         filters = {name: each.filters for name, each in self._as_measured[1].items()}
         return Bench(records, self._blocks, filters=filters)
+
+    def coloured_beside(self, blocks: Sequence[Block]) -> Bench | None:
+        """Return the same records with the colour of inputs that a better model leaves, if it shows one.
+
+        ``blocks``: of that model, with the names of the declared ones.
+        """
+        records, read = self._as_read
+        asked = [read[block.name].read_by(block) for block in blocks if block.name in read]
+        noise = with_colour_of_inputs(self.noise, records, asked)
+        if noise is self.noise:
+            return None
+        return Bench(
+            replace(records, remarks=self._remarks),
+            self._blocks,
+            noise=noise,
+            filters={name: each.filters for name, each in read.items()},
+            sampling={c.signal: c.sampling for c in records.columns if c.sampling},
+        )
 
     def inferred(self, blocks: Sequence[Block], missing: Missing = plain_terms) -> RecordSet:
         """Return the records with inputs of which nothing is said as they tell it by some blocks.
@@ -358,15 +377,6 @@ class Bench:
                 result.append(Evidence(driven, seen, floor, driven.samples(seen, values)))
         return result
 
-    def covered(self) -> dict[str, float]:
-        """Return by block the share of the power of its motion in the rows of the records that decide."""
-        deciding = {record.name for record in self.records.deciding}
-        shares = {
-            block: [floor.covered for record, floor in read.floors.items() if record in deciding]
-            for block, read in self.block_noise.items()
-        }
-        return {block: float(np.mean(each)) for block, each in shares.items() if each}
-
     def slowest(self) -> dict[str, float]:
         """Return the least speed that some record resolves, by the measured signal that it is the rate of."""
         speeds: dict[str, float] = {}
@@ -404,3 +414,13 @@ class Bench:
                 masked = {n: m[::k] for n, m in masked.items()}
             self._thin[key] = replace(record, trace=trace, masked=masked), NoiseFloor(one[counted], raw, raw)
         return self._thin[key]
+
+
+def covered(bench: Bench) -> dict[str, float]:
+    """Return by block the share of the power of its motion in the rows of the records that decide."""
+    deciding = {record.name for record in bench.records.deciding}
+    shares = {
+        block: [floor.covered for record, floor in read.floors.items() if record in deciding]
+        for block, read in bench.block_noise.items()
+    }
+    return {block: float(np.mean(each)) for block, each in shares.items() if each}

@@ -7,7 +7,8 @@ its noise. Two other looks do, and both must show the same:
   in a signal moves nothing. A reading that flips between two counts has a variance of a quarter of their
   square, the most that it can have; what a signal may do there unseen follows from what a motion costs at
   least, per acceleration, where it is seen. Records in which that is more than the white noise are used where
-  no other shows a colour, as on a drive without a gear, and three do: then the other look decides.
+  no other record tells, white or coloured, as on a drive without a gear, and three do: then the other look
+  decides.
 - *What is left of a block* that the signal drives, whatever its numbers are and whichever plain functions of
   the motion it lacks. It bounds the noise from above at the frequencies of the motion.
 
@@ -69,7 +70,8 @@ def with_colour_of_inputs(noise: Noise, records: RecordSet, seen: Sequence[Block
         above = {record.name: read.above_motion(record, counts) for record in read.records}
         sure = {name: bands for name, (bands, hidden) in above.items() if bands and not hidden}
         shown = sure or {name: bands for name, (bands, _) in above.items() if bands}
-        if not sure and len(shown) < _LEAST_RECORDS:
+        white = any(not bands and not hidden for bands, hidden in above.values())
+        if not sure and (white or len(shown) < _LEAST_RECORDS):
             continue
         for each in seen if shown else ():
             colours = read.colours(each, shown)

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks._score_run import opened
 from nlsdesign.bench.discrepancy import diagnose, effects
-from nlsdesign.bench.discrepancy.diagnose import _Case, blocks_of
+from nlsdesign.bench.discrepancy.case import Case, blocks_of
 from nlsdesign.bench.discrepancy.effects.effect import Candidate
 from nlsdesign.bench.discrepancy.selection.hypothesis import Hypothesis
 from nlsdesign.bench.identification.equation_error import block_noise
@@ -119,13 +119,13 @@ def test_a_lag_is_not_what_inputs_are_read_beside() -> None:
     """It may stand for the shift itself, and would hide it for good."""
     asked = list[str]()
 
-    class Case(_Case):
-        def _read_beside(self, hypothesis: Hypothesis, lacks: object) -> _Case | None:
+    class Asked(Case):
+        def _read_beside(self, hypothesis: Hypothesis, lacks: object) -> Case | None:
             assert lacks is plain_terms
             asked.append(hypothesis.newest.effect)
             return self
 
-    case = Case(cast(Any, None), cast(Any, None), cast(Any, None), cast(Any, None))
+    case = Asked(cast(Any, None), cast(Any, None), cast(Any, None), cast(Any, None))
     blank = assembly("blank", load=Fixed())
     friction, lag = (
         Hypothesis(blank, (Candidate(name, "motor", blank, (), "sign", "source", explains_lag=late),))

@@ -10,7 +10,8 @@ import pytest
 
 from benchmarks._score_run import opened
 from nlsdesign.bench.discrepancy import Verdict, diagnose, effects
-from nlsdesign.bench.discrepancy.diagnose import _Case, _Decision
+from nlsdesign.bench.discrepancy import case as reading
+from nlsdesign.bench.discrepancy.case import Case
 from nlsdesign.bench.discrepancy.effects.effect import EffectFunction
 from nlsdesign.bench.discrepancy.selection.search import Outcome
 from nlsdesign.bench.identification.equation_error.inferred_sampling import no_terms, plain_terms
@@ -85,10 +86,10 @@ def test_inputs_are_asked_as_if_nothing_were_missing_where_nothing_is(
     """Plain terms hide a shift of a current: it stayed read as sampled beside a name that explained all."""
     asked = list[object]()
     bench: Any = SimpleNamespace(inferred=lambda _, missing=plain_terms: asked.append(missing))
-    monkeypatch.setattr(_Case, "_blocks", lambda *_: [])
-    monkeypatch.setattr(_Case, "_read_as", lambda *_: None)
+    monkeypatch.setattr(reading, "_blocks", lambda *_: [])
+    monkeypatch.setattr(Case, "_read_as", lambda *_: None)
     step: Any = SimpleNamespace()
     last: Any = SimpleNamespace(fitted=None)
     outcome = Outcome(last, (step,), complete=complete)
-    assert _Case(NO, bench, NO, NO).read_as_inferred_beside(outcome, _Decision("named")) is None
+    assert Case(NO, bench, NO, NO).read_as_inferred_beside(outcome, "named") is None
     assert asked == [lacks]

@@ -14,7 +14,7 @@ from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error import block_noise, evidence, inferred_sampling
 from nlsdesign.bench.identification.equation_error.block import Block
-from nlsdesign.bench.identification.equation_error.evidence import Bench, on_clock
+from nlsdesign.bench.identification.equation_error.evidence import Bench, covered, on_clock
 from nlsdesign.bench.identification.records.mapping import Column
 from nlsdesign.bench.identification.records.sampling import HELD, SAMPLED
 from nlsdesign.components import ROTATION, Dashpot, Encoder, Inertia, Spring, tie
@@ -113,7 +113,7 @@ def test_a_quick_swing_is_read_across_its_reversals(monkeypatch: pytest.MonkeyPa
     (floor,) = bench.block_noise["ball"].floors.values()
     if least:
         assert len(floor.sigma) > 3000
-        assert bench.covered()["ball"] > 0.9
+        assert covered(bench)["ball"] > 0.9
         assert bench.records.remarks == ()
     else:
         assert len(floor.sigma) < 100
