@@ -25,7 +25,7 @@ from ..tolerance.tolerance_result import ToleranceResult
 from .coil_limits import side_forces
 from .defaults import safe_limits
 from .design_search import Search, carried_over, same_design, spans_of
-from .limits import Bound
+from .limits import Bound, limits_in_words
 from .problem import DesignProblem
 from .program import Solution
 from .remedies import Remedies, find_remedies
@@ -181,11 +181,13 @@ def finished(solved: SolvedSearch) -> CamDesign:
     sentences = []
     if cam.rolling is None and "MaximumCableTension" not in kinds:
         sentences.append(
-            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
+            f"{cam.name} declares no cable, and no largest tension of one is asked for (MaximumCableTension): "
+            "nothing limits it"
         )
     if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
         sentences.append(
-            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
+            "no strength of the rubber is declared, no largest stress or strain of it is asked for "
+            "(MaximumStress, MaximumStrain)"
         )
     if cam.coils and "GoodmanSafety" not in kinds:
         sentences.append("wire and strength of the coil are not declared: nothing limits what the wire bears")
@@ -260,7 +262,7 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
         allowed=settings.largest_error,
         worst_angle=float(check.angles[worst]),
         worst_error=float(check.errors[worst]),
-        binding=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
+        binding=limits_in_words((state.limit, state.of) for state in limits if state.active),
         remedies=remedies,
         advice=advice,
     )
@@ -329,7 +331,7 @@ def _blocks(solved: SolvedSearch) -> Iterator[str]:
             yield (
                 f"{piece.name}: {1e3 * length:.3g} mm long with {1e6 * width * thickness:.4g} mm² of section "
                 f"is a block, no strip: clamped ends make it about {1.0 + stiffer:.2g} times as stiff as its "
-                f"law says -> ask for a longer one (RestLengthRange), more elements or thinner strips, or "
+                f"law says -> ask for a longer one (limit RestLengthRange), more elements or thinner strips, or "
                 f"measure it"
             )
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from inspect import isabstract
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -51,6 +53,14 @@ def test_every_limit_of_the_package_is_handed_out() -> None:
     names = {kind.__name__ for kind in own if not isabstract(kind)}
     assert "MaximumCamRadius" in names
     assert not names - set(design.__all__), "add them to nlsdesign/design/__init__.py"
+
+
+def test_every_curve_limit_and_goal_stands_in_a_how_to(root: Path) -> None:
+    pages = "".join(page.read_text(encoding="utf-8") for page in (root / "docs" / "how_to").glob("*.md"))
+    bases = (Limit, design.Target, design.Goal, design.TaskGoal)
+    names = {name for base in bases for name in design.kinds(base) if name in design.__all__}
+    assert len(names) > 30
+    assert not {name for name in names if not re.search(rf"\b{name}\b", pages)}
 
 
 @pytest.mark.parametrize(
