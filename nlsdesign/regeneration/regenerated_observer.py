@@ -24,6 +24,7 @@ from ..bench.identification.least_squares import Fit
 from ..feedback.control import (
     ClosedLoop,
     ScheduledTorque,
+    Tracking,
     encoder_loop,
     largest_torque,
     tracking,
@@ -62,13 +63,25 @@ SCATTER = 1.02
 GAIN = "controller.bandwidth"
 
 
+PERIODS = 6
+"""Of a sine, of which the last four count: of fewer the harmonics of a bent answer look like a limit cycle."""
+
+
 class TrackedSine(NamedTuple):
-    """Root mean square torque error on a sine of the wanted torque, in N·m; not a number in a limit cycle."""
+    """How the torque follows a sine of the wanted torque under two observers and controllers."""
 
     amplitude: float  # N·m
     frequency: float  # Hz
-    before: float
-    after: float
+    before: Tracking
+    after: Tracking
+
+    def shown(self) -> tuple[str, ...]:
+        """Return the numbers, and for a loop that hunts how it does, as text."""
+        loops = (
+            f"{three_digits(t.rms_error)}" if t.verdict.holds else str(t.verdict)
+            for t in (self.before, self.after)
+        )
+        return (three_digits(self.amplitude), three_digits(self.frequency), *loops)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,13 +93,14 @@ class RegeneratedController:
     controller
         Of the better model, or of the declared one where that follows better.
     sines
-        Under observer and controller of the declared model, and of the better one.
+        Under observer and controller of the declared model, and under what is generated of the better one.
     added
         Parameters of the better controller that the declared one lacks: what it compensates.
     margins
-        Sentence on the margins of the better controller.
+        Sentence on the margins of the controller to take.
     kept
-        Why the declared controller stays; empty where it is replaced.
+        Why the declared controller stays, and how it goes with the generated observer; empty where it is
+        replaced.
     """
 
     controller: FlatModel
@@ -97,11 +111,11 @@ class RegeneratedController:
 
     def words(self) -> tuple[str, ...]:
         """Return tracking before and after, and the margins, in sentences."""
-        errors = " → ".join(three_digits(1e3 * _rms([s[place] for s in self.sines])) for place in (2, 3))
+        errors = " → ".join(_followed(self.sines, which) for which in ("before", "after"))
         added = f", which also reckons with {', '.join(self.added)}" if self.added and not self.kept else ""
         taken = self.kept or f"the controller is that of the better model{added}"
         return (
-            f"Torque error of the better model under observer and controller, before → after: {errors} mN·m, "
+            f"Torque error of the better model under observer and controller, before → after: {errors}, "
             f"over sines of {_span([s.amplitude for s in self.sines])} N·m at "
             f"{_span([s.frequency for s in self.sines])} Hz.",
             f"{taken[0].upper()}{taken[1:]}; {self.margins}.",
@@ -111,8 +125,13 @@ class RegeneratedController:
         """Return what stands in ``regeneration.json``."""
         return {
             "sines": [
-                {name: value if math.isfinite(value) else None for name, value in sine._asdict().items()}
-                for sine in self.sines
+                {
+                    "amplitude": s.amplitude,
+                    "frequency": s.frequency,
+                    **{which: _finite(getattr(s, which).rms_error) for which in ("before", "after")},
+                    **{f"{which}_is": str(getattr(s, which).verdict) for which in ("before", "after")},
+                }
+                for s in self.sines
             ],
             "added": list(self.added),
             "margins": self.margins,
@@ -124,42 +143,55 @@ def _span(values: list[float]) -> str:
     return " and ".join(f"{value:.3g}" for value in sorted(set(values)))
 
 
-def regenerated_controller(
-    declared: FlatModel, better: FlatModel, sample_time: float
-) -> RegeneratedController:
-    """Design observer and controller of both models, and let the machine of the better one follow sines.
+def _followed(sines: Sequence[TrackedSine], which: str) -> str:
+    """Return the error over the sines that were followed, and how many were not and how."""
+    tracked: list[Tracking] = [getattr(sine, which) for sine in sines]
+    errors = [t.rms_error for t in tracked if t.verdict.holds]
+    hunting = [t.verdict for t in tracked if not t.verdict.holds]
+    words = [f"{three_digits(1e3 * _rms(errors))} mN·m"] if errors else []
+    if hunting:
+        worst = max(hunting, key=lambda verdict: np.nan_to_num(verdict.amplitude, nan=math.inf))
+        words.append(f"{len(hunting)} of {len(tracked)} sines not followed ({worst})")
+    return " and ".join(words)
 
-    ``declared``, ``better``: on the bench, load fixed. ``sample_time`` in s. Raises an ``NlsError`` where the
-    declared model has no controller, or the better one none.
+
+def regenerated_controller(
+    declared: FlatModel,
+    better: FlatModel,
+    observers: tuple[FlatModel, FlatModel],
+    sample_time: float,
+) -> RegeneratedController:
+    """Design the controller of both models, and let the machine of the better one follow sines under each.
+
+    ``declared``, ``better``: on the bench, load fixed. ``observers``: of the declared model, and the one that
+    is generated. ``sample_time`` in s. Raises an ``NlsError`` where a model has no controller.
     """
-    before, _ = usual_controller(declared, sample_time)
+    before, declared_margins = usual_controller(declared, sample_time)
     after, margins = usual_controller(better, sample_time)
     plant = with_outputs(better, [measured_motion(better), series_spring(better).effort])
-    old = design_observer(declared, gain=CascadeGain(), sample_time=sample_time)
-    try:
-        new = design_observer(better, gain=CascadeGain(), sample_time=sample_time)
-    except NlsError:
-        # A law that no observer holds, as of hysteresis; its controller may still follow better.
-        watched = with_numbers(declared, better.values)
-        new = design_observer(watched, gain=CascadeGain(), sample_time=sample_time)
-        margins += f"; the observer in the loop after is {STAND_IN}"
-    loops = [
-        encoder_loop(plant, observer=old, controller=before),
-        encoder_loop(plant, observer=new, controller=after),
-    ]
     side, last = only_side(declared), usual_last(declared)
     most = min(largest_torque(declared), abs(torque_at_rest(KnownDrive(declared), (side or 1.0) * last)))
-    sines = tuple(
-        TrackedSine(
-            share * most, frequency, *(sine_error(loop, share * most, frequency, side) for loop in loops)
-        )
-        for share in SHARES
-        for frequency in FREQUENCIES
-    )
+    asked = [(share * most, frequency) for share in SHARES for frequency in FREQUENCIES]
+
+    def tracked(observer: FlatModel, controller: FlatModel) -> list[Tracking]:
+        loop = encoder_loop(plant, observer=observer, controller=controller)
+        return [sine_tracking(loop, *sine, side) for sine in asked]
+
+    pairs = zip(tracked(observers[0], before), tracked(observers[1], after), strict=True)
+    sines = tuple(TrackedSine(*sine, *pair) for sine, pair in zip(asked, pairs, strict=True))
+    hunts = {which: any(not getattr(s, which).verdict.holds for s in sines) for which in ("before", "after")}
+    errors = [_rms([t.rms_error for t in each]) for each in ([s.before for s in sines], [s.after for s in sines])]
     kept = ""
-    errors = [_rms([sine[place] for sine in sines]) for place in (2, 3)]
-    if not errors[1] <= SCATTER * errors[0] and math.isfinite(errors[0]):
+    if hunts["after"]:
+        both = ", and so does that of the declared model: neither is fit for the machine" if hunts["before"] else ""
+        kept = f"the controller stays that of the declared model: under that of the better model the loop hunts{both}"
+    elif errors[1] > SCATTER * errors[0]:
         kept = "the controller stays that of the declared model, which follows better"
+    if kept and not hunts["before"] and observers[0] is not observers[1]:
+        mixed = [TrackedSine(*sine, t, t) for sine, t in zip(asked, tracked(observers[1], before), strict=True)]
+        kept += f"; with the generated observer: {_followed(mixed, 'after')}"
+    if kept:
+        margins = f"on the declared machine {declared_margins}"
     added = tuple(sorted(set(after.values) - set(before.values)))
     return RegeneratedController(before if kept else after, sines, added, margins, kept)
 
@@ -171,15 +203,15 @@ def usual_controller(model: FlatModel, sample_time: float) -> tuple[FlatModel, s
     )
 
 
-def sine_error(loop: ClosedLoop, amplitude: float, frequency: float, side: float) -> float:
-    """Return the torque error over the last period of a sine; not a number in a limit cycle."""
-    stop = 3.0 / frequency
+def sine_tracking(loop: ClosedLoop, amplitude: float, frequency: float, side: float) -> Tracking:
+    """Return how the torque follows the last periods of a sine."""
+    stop = PERIODS / frequency
     wanted = Sine(amplitude, frequency, offset=1.25 * side * amplitude)
     run = loop.run(stop, inputs={loop.desired: wanted})
     # What rubs in the tie of the spring is no torque of the spring: neither sensor nor observer has it.
     carried = run[f"plant.{carried_torque(KnownDrive(loop.plant))}"]
     run = run.with_signals({loop.torque: carried}, {})
-    return tracking(loop, run, settled=stop - 1.0 / frequency).rms_error
+    return tracking(loop, run, settled=stop - (PERIODS - 2) / frequency)
 
 
 DRAWS = 8
@@ -232,6 +264,9 @@ class Regeneration:
         Time, measured torque, and both estimates on the first of these records.
     controller
         The torque controller, and how the machine follows under it; ``None`` where there is none.
+    replaced
+        Of the declared model's observers the one that errs least on the records that decide; ``None`` where
+        nothing was compared.
     """
 
     plant: FlatModel
@@ -246,6 +281,7 @@ class Regeneration:
     spread_after: tuple[float, ...] = ()
     course: tuple[Array, Array, Array, Array] | None = None
     controller: RegeneratedController | None = None
+    replaced: FlatModel | None = None
 
     @property
     def nominal(self) -> tuple[float, float]:
@@ -346,9 +382,12 @@ def regenerate(
     """
     choice = choice or ObserverChoice()
     result = regenerated_observer(declared, better, records, fits=fits, choice=choice, progress=progress)
+    if result.observer is None:
+        return result
     progress("designing the controllers, and following sines under both")
     try:
-        controller = regenerated_controller(declared, better, choice.sample_time)
+        old = result.replaced or _designed(declared, choice).model
+        controller = regenerated_controller(declared, better, (old, result.observer), choice.sample_time)
     except NlsError as error:
         return replace(result, reasons=(*result.reasons, f"no controller is compared: {error}"))
     return replace(result, controller=controller)
@@ -382,7 +421,7 @@ def regenerated_observer(
     progress("designing the observers that learn")
     learned = [_learning(model, choice) for model in (declared, watched)]
     both = [each for each in learned if not isinstance(each, str)]
-    generated, chosen = _generated((before, after), both if len(both) == 2 else [], deciding)
+    generated, chosen, replaced = _generated((before, after), both if len(both) == 2 else [], deciding)
     corrected, lacking = _compared(learned, runs)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
@@ -403,6 +442,7 @@ def regenerated_observer(
         spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
         spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
         course=(runs[0].trace.time, runs[0].torque, *pairs[0]),
+        replaced=replaced.model,
         **known,
     )
 
@@ -471,10 +511,10 @@ def _generated(
     cascades: tuple[ObserverDesign, ObserverDesign],
     corrected: Sequence[CorrectedDesign],
     deciding: Sequence[WatchedRecord],
-) -> tuple[ObserverDesign | CorrectedDesign, str]:
-    """Return the observer that errs least on the records that decide, and why in words.
+) -> tuple[ObserverDesign | CorrectedDesign, str, ObserverDesign | CorrectedDesign]:
+    """Return the observer that errs least on the records that decide, why in words, and the declared best.
 
-    It is one of the declared model where none of the better model errs less: what is worse replaces nothing.
+    The first is one of the declared model where none of the better model errs less: what is worse replaces nothing.
     ``corrected``: those of the declared and of the better model, or none.
     """
     named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
@@ -490,15 +530,16 @@ def _generated(
     roles = ", ".join(sorted({run.record.role.replace("_", " ") for run in deciding}))
     share = 1.0 - errors[replaced][0] / max(errors[best][1], 1e-300)
     if share > TIE:
-        name = named[replaced][0]
-        return named[replaced][1], (
+        name, old, _ = named[replaced]
+        words = (
             f"{name} of the declared model, which is not replaced: on the records that decide ({roles}) it "
             f"errs by {100.0 * share:.2g} % less than those of the better model"
         )
+        return old, words, old
     name, _, design = named[best]
-    if len(named) == 1:
-        return design, name
-    return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
+    if len(named) > 1:
+        name += f": it errs less on the records that decide ({roles}) than the other"
+    return design, name, named[replaced][1]
 
 
 def _failures(spread: Sequence[float]) -> tuple[str, ...]:

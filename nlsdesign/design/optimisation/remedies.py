@@ -133,7 +133,7 @@ class Hollow:
     def __str__(self) -> str:
         besides = "" if self.freed is None else f" ({self.freed} besides)"
         return (
-            f"the contour would have to be hollow (ConvexContour) {self.spans}, with radii of curvature "
+            f"the contour would have to be hollow {self.spans} (ConvexContour), with radii of curvature "
             f"down to {1e3 * self.deepest:.3g} mm{besides}; {self.what}"
         )
 

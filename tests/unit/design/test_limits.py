@@ -108,7 +108,7 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
     )
     start = problem.at(Start(0.5, 0.3, {}))
     first, *rest = limit.bounds(problem.design)
-    assert str(first) == f"{type(limit).__name__}: {text}"
+    assert (first.limit, str(first)) == (type(limit).__name__, text)
     assert len(rest) == (1 if hasattr(limit, "maximum") else 0)
     # The row is the distance from the bound in units of its scale; a slack of 1 gives way by one scale.
     row = row_of(first)

@@ -174,7 +174,7 @@ def test_a_limit_on_a_radius_is_held_as_a_curvature_and_read_as_a_radius() -> No
     design = design_cam(machine(), target=hill(), free=CONTOUR, keep=keep, settings=QUICK)
     (state,) = (each for each in design.limits if each.limit == "MinimumRadiusOfCurvature")
     assert (state.upper, state.bound, state.active) == (False, pytest.approx(8e-3), True)
-    assert "radius of the convex edge 8 mm >= 8 mm  ACTIVE" in str(state)
+    assert "radius of the convex edge 8 mm >= 8 mm (MinimumRadiusOfCurvature)  ACTIVE" in str(state)
     rho = design.contour.radii_of_curvature
     assert rho[rho > 0.0].min() == pytest.approx(8e-3, rel=2e-3)
 
