@@ -180,15 +180,23 @@ def regenerated_controller(
     pairs = zip(tracked(observers[0], before), tracked(observers[1], after), strict=True)
     sines = tuple(TrackedSine(*sine, *pair) for sine, pair in zip(asked, pairs, strict=True))
     hunts = {which: any(not getattr(s, which).verdict.holds for s in sines) for which in ("before", "after")}
-    errors = [_rms([t.rms_error for t in each]) for each in ([s.before for s in sines], [s.after for s in sines])]
+    errors = [
+        _rms([t.rms_error for t in each]) for each in ([s.before for s in sines], [s.after for s in sines])
+    ]
     kept = ""
     if hunts["after"]:
-        both = ", and so does that of the declared model: neither is fit for the machine" if hunts["before"] else ""
+        both = (
+            ", and so does that of the declared model: neither is fit for the machine"
+            if hunts["before"]
+            else ""
+        )
         kept = f"the controller stays that of the declared model: under that of the better model the loop hunts{both}"
     elif errors[1] > SCATTER * errors[0]:
         kept = "the controller stays that of the declared model, which follows better"
     if kept and not hunts["before"] and observers[0] is not observers[1]:
-        mixed = [TrackedSine(*sine, t, t) for sine, t in zip(asked, tracked(observers[1], before), strict=True)]
+        mixed = [
+            TrackedSine(*sine, t, t) for sine, t in zip(asked, tracked(observers[1], before), strict=True)
+        ]
         kept += f"; with the generated observer: {_followed(mixed, 'after')}"
     if kept:
         margins = f"on the declared machine {declared_margins}"

@@ -141,6 +141,16 @@ def test_a_torque_that_changes_its_sign_is_met_by_a_convex_profile(signs: CamDes
     assert np.sqrt(np.mean((torques - signs.target.torque(angles)) ** 2)) < 0.005 * 2.0
 
 
+def test_a_pair_that_nothing_keeps_small_says_how_large_it_is(hills: CamDesign, signs: CamDesign) -> None:
+    assert not any("size of this pair" in remark for remark in hills.remarks), "1.06 times its coil"
+    (said,) = (remark for remark in signs.remarks if "size of this pair" in remark)
+    distance = signs.values["spring.cam.base_distance"].number
+    assert f"its pivots are {1e3 * distance:.3g} mm apart" in said
+    limit = float(said.partition('radius = "')[2].partition(" mm")[0])
+    assert 1e3 * signs.contour.radii.max() > limit
+    assert "MaximumCamRadius" in said
+
+
 def test_the_optimiser_sees_the_edge_that_is_drawn(signs: CamDesign) -> None:
     seen, contour = signs.curves, signs.contour
     at = np.searchsorted(contour.angles, seen.angles - 1e-9)

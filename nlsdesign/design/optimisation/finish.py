@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +13,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import NlsError
-from ...foundation.quantity import Quantity, significant
+from ...foundation.quantity import MM, Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.origin import derived
 from ..curves.target import Target
@@ -191,6 +191,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
         )
     if cam.coils and "GoodmanSafety" not in kinds:
         sentences.append("wire and strength of the coil are not declared: nothing limits what the wire bears")
+    sentences += _unlimited_pair(solved, kinds)
     sentences += side_forces(design, lambda each: problem.evaluate(each, best.point))
     sentences += [f"{at}.{text}" for at, part in solved.changed.walk() for text in part.remarks()]
     return CamDesign(
@@ -296,6 +297,25 @@ def _ends(solved: SolvedSearch) -> Iterator[str]:
             value = solved.changes[variable.name]
             if problem.named(point)[variable.name] > 0.0:
                 yield f"{variable.name} = {value} is the end of its range, no limit of yours: bound it"
+
+
+_PAIR_SIZE = 2.0
+"""Radius of a cam that rolls on its mirror image, over the length of the element between the pivots without
+load, from which its size is remarked. Assumed; the joints of Wu and Mintchev 2024 have 1.04 to 1.10."""
+
+
+def _unlimited_pair(solved: SolvedSearch, kinds: Container[str]) -> Iterator[str]:
+    """Yield how large a rolling pair came out where no limit keeps its smooth profile from growing."""
+    cam, values = solved.search.problem.law.cam, solved.model.values
+    if cam.rolling is None or cam.rolling.radius is not None or "MaximumCamRadius" in kinds:
+        return
+    enough = _PAIR_SIZE * max(values[name] for name in cam.lengths)
+    if solved.contour_fit[0].radii.max() > enough:
+        yield (
+            f"nothing limits the size of this pair: its pivots are {MM * values[cam.rolling.base]:.3g} mm apart at "
+            f'angle zero -> limit the cam radius, MaximumCamRadius = {{radius = "{MM * enough:.3g} mm"}} for '
+            "instance, twice the length of its element"
+        )
 
 
 def _beyond_defaults(solved: SolvedSearch) -> Iterator[str]:

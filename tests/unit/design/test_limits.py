@@ -33,7 +33,7 @@ from nlsdesign.design import (
     design_cam,
 )
 from nlsdesign.design.optimisation import limits
-from nlsdesign.design.optimisation.design_search import row_of
+from nlsdesign.design.optimisation.design_search import row_of, spans_of
 from nlsdesign.design.optimisation.problem import design_problem
 from nlsdesign.design.optimisation.program import Program, Rows
 from nlsdesign.design.optimisation.shape import Start
@@ -172,3 +172,17 @@ def test_a_program_without_anything_to_make_small_is_solved() -> None:
     solution = program.solve(np.array([1.0]))
     assert solution.solved
     assert solution.point[0] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "words"),
+    [
+        ((0, 1, 2), "from 0° to 2°"),
+        ((0, 2, 4, 8), "from 0° to 4° and at 8°"),
+        ((0, 3, 6), "at 0° and at 3° and at 6°"),
+        ((1, 4, 7, 8, 11), "in 4 places from 1° to 11°"),
+    ],
+)
+def test_where_something_holds_is_said_in_few_ranges(nodes: tuple[int, ...], words: str) -> None:
+    angles = np.radians(np.arange(13.0))
+    assert spans_of(angles, np.isin(np.arange(13), nodes)) == words

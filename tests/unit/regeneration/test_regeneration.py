@@ -266,7 +266,12 @@ def tracked(error: float) -> Tracking:
     [
         (1.0, 1.01, 5.0, "The controller is that of the better model"),
         (1.0, 1.03, 1.5, "follows better; with the generated observer: 1500 mN·m"),
-        (1.0, math.nan, 1.5, "under that of the better model the loop hunts; with the generated observer: 1500"),
+        (
+            1.0,
+            math.nan,
+            1.5,
+            "under that of the better model the loop hunts; with the generated observer: 1500",
+        ),
         (math.nan, 1.0, 5.0, "The controller is that of the better model"),
         (math.nan, math.nan, 5.0, "hunts, and so does that of the declared model: neither is fit"),
     ],
