@@ -4,8 +4,6 @@ The torque that the records show is compared with what two observers make of the
 one designed from the declared model, one from the better model. Both read the same samples. The same is
 repeated with numbers drawn from what is known of them: the declared spreads before, the covariance of the
 fits after.
-
-The torque controller of the better model: what it adds, its margins, its tracking before and after.
 """
 
 from __future__ import annotations
@@ -21,24 +19,12 @@ import numpy as np
 
 from ..bench.identification import RecordSet
 from ..bench.identification.least_squares import Fit
-from ..feedback.control import (
-    ClosedLoop,
-    ScheduledTorque,
-    Tracking,
-    encoder_loop,
-    largest_torque,
-    tracking,
-    with_margin,
-)
-from ..feedback.control.laws.known_drive import KnownDrive, carried_torque, only_side, torque_at_rest
 from ..feedback.observer import (
-    CascadeGain,
     CorrectedDesign,
     FixedGrid,
     Grid,
     ObserverDesign,
     design_corrected_observer,
-    design_observer,
     design_observer_with_details,
 )
 from ..feedback.observer.scheduling.scheduled import whole_contour
@@ -49,178 +35,9 @@ from ..foundation.text_files import write_text
 from ..foundation.work_sharing import parallel_map
 from ..model import FlatModel
 from ..model.roles import measured_motion, series_spring
-from ..model.transform import with_outputs
-from ..simulation import Sine, declared_prior
-from .readiness import usual_last
+from ..simulation import declared_prior
+from .regenerated_controller import RegeneratedController, finite, regenerated_controller, rms
 from .watched_records import STAND_IN, ObserverChoice, WatchedRecord, with_numbers
-
-SHARES = (0.2, 0.6)
-"""Amplitudes of the sines over the largest torque that the declared drive can hold, up to the usual angle."""
-FREQUENCIES = (1.0, 4.0)
-"""In Hz."""
-SCATTER = 1.02
-"""Largest error over that before with which a controller is no worse."""
-GAIN = "controller.bandwidth"
-
-
-PERIODS = 6
-"""Of a sine, of which the last four count: of fewer the harmonics of a bent answer look like a limit cycle."""
-
-
-class TrackedSine(NamedTuple):
-    """How the torque follows a sine of the wanted torque under two observers and controllers."""
-
-    amplitude: float  # N·m
-    frequency: float  # Hz
-    before: Tracking
-    after: Tracking
-
-    def shown(self) -> tuple[str, ...]:
-        """Return the numbers, and for a loop that hunts how it does, as text."""
-        loops = (
-            f"{three_digits(t.rms_error)}" if t.verdict.holds else str(t.verdict)
-            for t in (self.before, self.after)
-        )
-        return (three_digits(self.amplitude), three_digits(self.frequency), *loops)
-
-
-@dataclass(frozen=True, eq=False)
-class RegeneratedController:
-    """The controller to take, and how the machine of the better model follows sines under both.
-
-    Parameters
-    ----------
-    controller
-        Of the better model, or of the declared one where that follows better.
-    sines
-        Under observer and controller of the declared model, and under what is generated of the better one.
-    added
-        Parameters of the better controller that the declared one lacks: what it compensates.
-    margins
-        Sentence on the margins of the controller to take.
-    kept
-        Why the declared controller stays, and how it goes with the generated observer; empty where it is
-        replaced.
-    """
-
-    controller: FlatModel
-    sines: tuple[TrackedSine, ...]
-    added: tuple[str, ...]
-    margins: str
-    kept: str = ""
-
-    def words(self) -> tuple[str, ...]:
-        """Return tracking before and after, and the margins, in sentences."""
-        errors = " → ".join(_followed(self.sines, which) for which in ("before", "after"))
-        added = f", which also reckons with {', '.join(self.added)}" if self.added and not self.kept else ""
-        taken = self.kept or f"the controller is that of the better model{added}"
-        return (
-            f"Torque error of the better model under observer and controller, before → after: {errors}, "
-            f"over sines of {_span([s.amplitude for s in self.sines])} N·m at "
-            f"{_span([s.frequency for s in self.sines])} Hz.",
-            f"{taken[0].upper()}{taken[1:]}; {self.margins}.",
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what stands in ``regeneration.json``."""
-        return {
-            "sines": [
-                {
-                    "amplitude": s.amplitude,
-                    "frequency": s.frequency,
-                    **{which: _finite(getattr(s, which).rms_error) for which in ("before", "after")},
-                    **{f"{which}_is": str(getattr(s, which).verdict) for which in ("before", "after")},
-                }
-                for s in self.sines
-            ],
-            "added": list(self.added),
-            "margins": self.margins,
-            "kept": self.kept,
-        }
-
-
-def _span(values: list[float]) -> str:
-    return " and ".join(f"{value:.3g}" for value in sorted(set(values)))
-
-
-def _followed(sines: Sequence[TrackedSine], which: str) -> str:
-    """Return the error over the sines that were followed, and how many were not and how."""
-    tracked: list[Tracking] = [getattr(sine, which) for sine in sines]
-    errors = [t.rms_error for t in tracked if t.verdict.holds]
-    hunting = [t.verdict for t in tracked if not t.verdict.holds]
-    words = [f"{three_digits(1e3 * _rms(errors))} mN·m"] if errors else []
-    if hunting:
-        worst = max(hunting, key=lambda verdict: np.nan_to_num(verdict.amplitude, nan=math.inf))
-        words.append(f"{len(hunting)} of {len(tracked)} sines not followed ({worst})")
-    return " and ".join(words)
-
-
-def regenerated_controller(
-    declared: FlatModel,
-    better: FlatModel,
-    observers: tuple[FlatModel, FlatModel],
-    sample_time: float,
-) -> RegeneratedController:
-    """Design the controller of both models, and let the machine of the better one follow sines under each.
-
-    ``declared``, ``better``: on the bench, load fixed. ``observers``: of the declared model, and the one that
-    is generated. ``sample_time`` in s. Raises an ``NlsError`` where a model has no controller.
-    """
-    before, declared_margins = usual_controller(declared, sample_time)
-    after, margins = usual_controller(better, sample_time)
-    plant = with_outputs(better, [measured_motion(better), series_spring(better).effort])
-    side, last = only_side(declared), usual_last(declared)
-    most = min(largest_torque(declared), abs(torque_at_rest(KnownDrive(declared), (side or 1.0) * last)))
-    asked = [(share * most, frequency) for share in SHARES for frequency in FREQUENCIES]
-
-    def tracked(observer: FlatModel, controller: FlatModel) -> list[Tracking]:
-        loop = encoder_loop(plant, observer=observer, controller=controller)
-        return [sine_tracking(loop, *sine, side) for sine in asked]
-
-    pairs = zip(tracked(observers[0], before), tracked(observers[1], after), strict=True)
-    sines = tuple(TrackedSine(*sine, *pair) for sine, pair in zip(asked, pairs, strict=True))
-    hunts = {which: any(not getattr(s, which).verdict.holds for s in sines) for which in ("before", "after")}
-    errors = [
-        _rms([t.rms_error for t in each]) for each in ([s.before for s in sines], [s.after for s in sines])
-    ]
-    kept = ""
-    if hunts["after"]:
-        both = (
-            ", and so does that of the declared model: neither is fit for the machine"
-            if hunts["before"]
-            else ""
-        )
-        kept = f"the controller stays that of the declared model: under that of the better model the loop hunts{both}"
-    elif errors[1] > SCATTER * errors[0]:
-        kept = "the controller stays that of the declared model, which follows better"
-    if kept and not hunts["before"] and observers[0] is not observers[1]:
-        mixed = [
-            TrackedSine(*sine, t, t) for sine, t in zip(asked, tracked(observers[1], before), strict=True)
-        ]
-        kept += f"; with the generated observer: {_followed(mixed, 'after')}"
-    if kept:
-        margins = f"on the declared machine {declared_margins}"
-    added = tuple(sorted(set(after.values) - set(before.values)))
-    return RegeneratedController(before if kept else after, sines, added, margins, kept)
-
-
-def usual_controller(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
-    """Return the controller that is generated where nobody states a gain, and a sentence on its margins."""
-    return with_margin(
-        model, GAIN, last=usual_last(model), given=False, sample_time=sample_time, law=ScheduledTorque()
-    )
-
-
-def sine_tracking(loop: ClosedLoop, amplitude: float, frequency: float, side: float) -> Tracking:
-    """Return how the torque follows the last periods of a sine."""
-    stop = PERIODS / frequency
-    wanted = Sine(amplitude, frequency, offset=1.25 * side * amplitude)
-    run = loop.run(stop, inputs={loop.desired: wanted})
-    # What rubs in the tie of the spring is no torque of the spring: neither sensor nor observer has it.
-    carried = run[f"plant.{carried_torque(KnownDrive(loop.plant))}"]
-    run = run.with_signals({loop.torque: carried}, {})
-    return tracking(loop, run, settled=stop - (PERIODS - 2) / frequency)
-
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
@@ -304,7 +121,7 @@ class Regeneration:
     @property
     def over_spread(self) -> tuple[float, float]:
         """Error over all records and draws, before and after."""
-        return _rms(self.spread_before), _rms(self.spread_after)
+        return rms(self.spread_before), rms(self.spread_after)
 
     def words(self) -> tuple[str, ...]:
         """Return the torque error before and after in sentences; none where nothing was compared."""
@@ -333,10 +150,10 @@ class Regeneration:
         return {
             "quantity": self.quantity,
             "unit": self.unit,
-            "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
-            "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
+            "nominal": dict(zip(keys, map(finite, self.nominal), strict=True)),
+            "over_spread": dict(zip(keys, map(finite, self.over_spread), strict=True)),
             "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
-            "corrected": dict(zip(keys, map(_finite, self.learning), strict=True)),
+            "corrected": dict(zip(keys, map(finite, self.learning), strict=True)),
             "records": [each._asdict() for each in self.errors],
             "corrected_records": [each._asdict() for each in self.corrected],
             "chosen": self.chosen,
@@ -347,15 +164,7 @@ class Regeneration:
 
 def _over_records(errors: Sequence[ObserverTorqueError]) -> tuple[float, float]:
     """Return the error over all records, before and after."""
-    return _rms([e.before for e in errors]), _rms([e.after for e in errors])
-
-
-def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(math.fsum(v * v for v in values) / len(values)) if values else math.nan
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return rms([e.before for e in errors]), rms([e.after for e in errors])
 
 
 def regenerate(
@@ -522,7 +331,8 @@ def _generated(
 ) -> tuple[ObserverDesign | CorrectedDesign, str, ObserverDesign | CorrectedDesign]:
     """Return the observer that errs least on the records that decide, why in words, and the declared best.
 
-    The first is one of the declared model where none of the better model errs less: what is worse replaces nothing.
+    The first is one of the declared model where none of the better model errs less: what is worse replaces
+    nothing.
     ``corrected``: those of the declared and of the better model, or none.
     """
     named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
@@ -531,7 +341,7 @@ def _generated(
     if corrected and not any(run.lacks(each) for run in deciding for each in corrected):
         named.append(("corrected observer", corrected[0], corrected[1]))
     errors = [
-        [_rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
+        [rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
     ]
     best = min(range(len(named)), key=lambda k: errors[k][1])
     replaced = min(range(len(named)), key=lambda k: errors[k][0])
@@ -583,7 +393,7 @@ def _drawn_error(
     ends = whole_contour(drawn)
     try:
         design = _designed(drawn, choice, FixedGrid(ends.lower, ends.upper, _POINTS))
-        return _rms([run.error(run.estimate(design)) for run in runs])
+        return rms([run.error(run.estimate(design)) for run in runs])
     except NlsError:
         return math.nan
 

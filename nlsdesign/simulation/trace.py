@@ -112,7 +112,7 @@ class _NamedSignals:
 
 @dataclass(frozen=True, eq=False)
 class Trace(_NamedSignals):
-    """Signals sampled at common times, simulated or measured, by name as in a mapping; ``len`` counts samples.
+    """Signals sampled at common times, simulated or measured, by name; the length is that of the time.
 
     Parameters
     ----------

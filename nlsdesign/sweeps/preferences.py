@@ -162,8 +162,8 @@ class RankedPoints:
     failed: Mask  # points without an answer, shape (n,)
     missed: Mask  # points with an answer that does not keep a requirement
     incomplete: Mask  # points that keep all requirements, with an answer to compare that is no finite number
-    # front: indices of the points on which no other improves in all preferences, the best in the first one first;
-    # empty without preferences
+    # front: indices of the points on which no other improves in all preferences, the best in the first one
+    # first; empty without preferences
     front: Indices
     misses: tuple[int, ...]  # how many points miss each requirement, in their order
 

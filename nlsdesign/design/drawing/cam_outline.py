@@ -112,7 +112,7 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
             f"cable radius {MM * cable_radius:g} mm",
             f"the cable is thicker than the sharpest radius under its centre line, "
             f"{MM * radii[index]:.4g} mm {place}",
-            next_step="take a thinner cable, or ask for a larger radius of curvature (MinimumRadiusOfCurvature)",
+            next_step="take a thinner cable, or ask for a larger radius (MinimumRadiusOfCurvature)",
         )
 
 

@@ -262,8 +262,8 @@ def trim_remarks(design: CamDesign) -> Iterator[str]:
                 factor = parse_unit(state.unit).factor
                 needed = with_unit(f"{low / factor:.4g} to {high / factor:.4g}", state.unit)
                 yield (
-                    f"the limit {'<=' if state.upper else '>='} {in_unit(state.bound, state.unit)} of {trim.name} "
-                    f"({state.limit}) holds for the nominal spring; to trim 95 % of the made ones it is set "
+                    f"the limit {in_unit(state.bound, state.unit)} of {trim.name} ({state.limit}) "
+                    f"holds for the nominal spring; to trim 95 % of the made ones it is set "
                     f"from {needed} -> leave it that travel, or narrow the spreads"
                 )
 

@@ -181,8 +181,7 @@ def finished(solved: SolvedSearch) -> CamDesign:
     sentences = []
     if cam.rolling is None and "MaximumCableTension" not in kinds:
         sentences.append(
-            f"{cam.name} declares no cable, and no largest tension of one is asked for (MaximumCableTension): "
-            "nothing limits it"
+            f"{cam.name} declares no cable, and none of its tension is limited (MaximumCableTension)"
         )
     if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
         sentences.append(
@@ -312,8 +311,9 @@ def _unlimited_pair(solved: SolvedSearch, kinds: Container[str]) -> Iterator[str
     enough = _PAIR_SIZE * max(values[name] for name in cam.lengths)
     if solved.contour_fit[0].radii.max() > enough:
         yield (
-            f"nothing limits the size of this pair: its pivots are {MM * values[cam.rolling.base]:.3g} mm apart at "
-            f'angle zero -> limit the cam radius, MaximumCamRadius = {{radius = "{MM * enough:.3g} mm"}} for '
+            "nothing limits the size of this pair: its pivots are "
+            f"{MM * values[cam.rolling.base]:.3g} mm apart at angle zero -> limit the cam radius, "
+            f'MaximumCamRadius = {{radius = "{MM * enough:.3g} mm"}} for '
             "instance, twice the length of its element"
         )
 
@@ -351,8 +351,8 @@ def _blocks(solved: SolvedSearch) -> Iterator[str]:
             yield (
                 f"{piece.name}: {1e3 * length:.3g} mm long with {1e6 * width * thickness:.4g} mm² of section "
                 f"is a block, no strip: clamped ends make it about {1.0 + stiffer:.2g} times as stiff as its "
-                f"law says -> ask for a longer one (limit RestLengthRange), more elements or thinner strips, or "
-                f"measure it"
+                f"law says -> ask for a longer one (limit RestLengthRange), more elements or thinner strips, "
+                "or measure it"
             )
 
 

@@ -52,7 +52,7 @@ class Bound:
 
 
 def limits_in_words(pairs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
-    """Return what each limit bounds, and its name in a deck behind it; of pairs of name and what it bounds."""
+    """Return what limits bound, each with its name in brackets; of pairs of name and what it bounds."""
     what: dict[str, dict[str, None]] = {}
     for limit, of in pairs:
         what.setdefault(limit, {})[of] = None

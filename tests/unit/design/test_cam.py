@@ -241,7 +241,7 @@ def test_conflict_with_the_target_is_named_too() -> None:
 def test_limits_of_the_geometry_alone_can_be_in_conflict() -> None:
     """An arc of 53° with a radius of 30 mm reaches further than 10 mm."""
     keep = [MinimumRadiusOfCurvature(30e-3), MaximumCamRadius(10e-3)]
-    with pytest.raises(InfeasibleError, match="limits of radius of curvature .*, cam radius .*: contra"):
+    with pytest.raises(InfeasibleError, match=r"limits of radius of curvature .*, cam radius .*: contra"):
         design_cam(actuator(CONCAVE), target=TARGET, free=CONTOUR, keep=keep)
 
 

@@ -48,6 +48,7 @@ from nlsdesign.regeneration import (
     ObserverChoice,
     Regeneration,
     regenerate,
+    regenerated_controller,
     regenerated_observer,
     write_regeneration,
 )
@@ -228,7 +229,7 @@ def test_controllers_are_compared_under_the_observers_that_are_exported(result: 
     plant = with_outputs(result.plant, ["motor.angle", "spring.torque"])
     loop = encoder_loop(plant, observer=result.observer, controller=controller.controller)
     last = controller.sines[-1]
-    run = regenerated_observer.sine_tracking(loop, last.amplitude, last.frequency, 0.0)
+    run = regenerated_controller.sine_tracking(loop, last.amplitude, last.frequency, 0.0)
     assert run.rms_error == last.after.rms_error
     assert controller.words()[0].startswith("Torque error of the better model under observer and controller")
 
@@ -237,10 +238,10 @@ def test_under_cascades_the_controller_of_the_better_model_follows_it_better(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """The torque of a spring that is a fifth stiffer than declared is estimated a sixth too small."""
-    monkeypatch.setattr(regenerated_observer, "usual_controller", plain_controller)
+    monkeypatch.setattr(regenerated_controller, "usual_controller", plain_controller)
     models = flatten(machine(DECLARED)), flatten(machine(TRUE))
     old, new = (design_observer(each, gain=CascadeGain(), sample_time=2e-3) for each in models)
-    for sine in regenerated_observer.regenerated_controller(*models, (old, new), 2e-3).sines:
+    for sine in regenerated_controller.regenerated_controller(*models, (old, new), 2e-3).sines:
         wanted = sine.amplitude / math.sqrt(2.0)
         assert sine.after.rms_error < 0.5 * sine.before.rms_error
         assert sine.before.rms_error > (1.0 - DECLARED / TRUE) * 0.8 * wanted
@@ -288,9 +289,9 @@ def test_a_controller_that_follows_worse_or_hunts_replaces_nothing(
             return tracked(after)
         return tracked(before if loop.observer is old else mixed)
 
-    monkeypatch.setattr(regenerated_observer, "sine_tracking", sine_tracking)
-    monkeypatch.setattr(regenerated_observer, "usual_controller", plain_controller)
-    chosen = regenerated_observer.regenerated_controller(declared, better, (old, new), 2e-3)
+    monkeypatch.setattr(regenerated_controller, "sine_tracking", sine_tracking)
+    monkeypatch.setattr(regenerated_controller, "usual_controller", plain_controller)
+    chosen = regenerated_controller.regenerated_controller(declared, better, (old, new), 2e-3)
     stays = "stays" in chosen.words()[1]
     assert words in chosen.words()[1]
     assert bool(chosen.kept) == stays == (not words.startswith("The controller is"))
@@ -309,7 +310,7 @@ def test_a_bent_answer_to_a_sine_is_no_limit_cycle_and_an_oscillation_beside_it_
         law, inner = ScheduledTorque(bandwidth=bandwidth), VelocityLoop(bandwidth=11.0 / 3.0 * bandwidth)
         controller = torque_controller(plant, law=law, velocity=inner)
         loop = encoder_loop(plant, observer=observer, controller=controller, delay=8)
-        run = regenerated_observer.sine_tracking(loop, 1.0, 4.0, 0.0)
+        run = regenerated_controller.sine_tracking(loop, 1.0, 4.0, 0.0)
         assert (run.verdict.state == "limit cycle") == hunts
         assert math.isnan(run.rms_error) if hunts else 0.2 < run.rms_error < 0.5
 
@@ -331,7 +332,7 @@ def test_friction_that_grows_with_the_load_inside_a_spring_is_compensated() -> N
     plant, declared = rubbing(TRUE), flatten(machine(TRUE))
     observer = design_observer(declared, gain=CascadeGain())
     unknown, known = (
-        regenerated_observer.sine_tracking(
+        regenerated_controller.sine_tracking(
             encoder_loop(plant, observer=observer, controller=torque_controller(model)), 1.0, 2.0, 0.0
         ).rms_error
         for model in (declared, plant)
