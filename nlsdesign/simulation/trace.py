@@ -97,6 +97,10 @@ class _NamedSignals:
             raise unknown_name("signal", name, self.signals)
         return self.signals[name]
 
+    def __contains__(self, name: object) -> bool:
+        """Tell whether there is a signal of that name."""
+        return name in self.signals
+
     def __iter__(self) -> Iterator[str]:
         """Yield the names of the signals."""
         return iter(self.signals)
