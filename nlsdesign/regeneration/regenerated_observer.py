@@ -237,8 +237,7 @@ def regenerated_observer(
     deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
     progress("designing the observers that learn")
     learned = [_learning(model, choice) for model in (declared, watched)]
-    both = [each for each in learned if not isinstance(each, str)]
-    generated, chosen, replaced = _generated((before, after), both if len(both) == 2 else [], deciding)
+    generated, chosen, replaced = _generated((before, after), learned, deciding)
     corrected, lacking = _compared(learned, runs)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
@@ -247,7 +246,7 @@ def regenerated_observer(
     )
     progress("designing observers over the spread of the numbers")
     draws = [*_draws(declared, ()), *_draws(better, fits)]
-    models = [*[declared] * DRAWS, *[watched] * DRAWS]
+    models = [declared] * DRAWS + [watched] * DRAWS
     spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
     return Regeneration(
         better,
@@ -326,19 +325,20 @@ def _compared(
 
 def _generated(
     cascades: tuple[ObserverDesign, ObserverDesign],
-    corrected: Sequence[CorrectedDesign],
+    learned: Sequence[CorrectedDesign | str],
     deciding: Sequence[WatchedRecord],
 ) -> tuple[ObserverDesign | CorrectedDesign, str, ObserverDesign | CorrectedDesign]:
     """Return the observer that errs least on the records that decide, why in words, and the declared best.
 
     The first is one of the declared model where none of the better model errs less: what is worse replaces
     nothing.
-    ``corrected``: those of the declared and of the better model, or none.
+    ``learned``: the corrected ones of the declared and of the better model, or why there is none.
     """
     named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
         ("cascade", *cascades)
     ]
-    if corrected and not any(run.lacks(each) for run in deciding for each in corrected):
+    corrected = [each for each in learned if not isinstance(each, str)]
+    if len(corrected) == 2 and not any(run.lacks(each) for run in deciding for each in corrected):
         named.append(("corrected observer", corrected[0], corrected[1]))
     errors = [
         [rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
