@@ -32,7 +32,7 @@ from nlsdesign.feedback.observer import CascadeGain, design_observer
 from nlsdesign.foundation.errors import NlsError
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.regeneration import regenerate
-from nlsdesign.regeneration.regenerated_observer import usual_controller
+from nlsdesign.regeneration.regenerated_controller import usual_controller
 from nlsdesign.regeneration.watched_records import with_numbers
 from tests.rig import ACTUATORS, Actuator, Hidden, make_records, truth, write_set
 from tests.rig.bench import Servo, simulate

@@ -33,6 +33,7 @@ suppress_warnings = ["myst.header"]
 html_theme = "furo"
 html_title = f"nlsdesign {release}"
 html_static_path = ["static"]
+html_favicon = "../../nlsdesign/live/page/icon.svg"
 html_css_files = ["site.css"]
 html_copy_source = False
 html_show_sphinx = False

@@ -24,8 +24,11 @@ _OTHERS = {
     "MaximumTorqueError": "torque error that is allowed",
     "NumberRange": "range of a free number",
     "RestLengthRange": "its rest length",
+    "AnchorClearance": "clearance of the anchor",
+    "ConvexContour": "convexity",
+    "PullingCable": "pull of the cable",
 }
-"""Classes of limits that the page has no slider for."""
+"""Limits that the page has no slider for."""
 _NO_LIMITS: Mapping[str, LimitNumber] = {}
 
 
@@ -41,13 +44,13 @@ def in_words(sentence: str, limits: Mapping[str, LimitNumber] = _NO_LIMITS) -> s
         kind = kinds[name]
         return f"{kind.title} ({kind.shown(limits[name].value)})" if name in limits else kind.title
 
-    # "MaximumStress: stress of rubber <= 2 MPa" says already what it limits.
-    stated = (
-        re.sub(rf"\b(?:{names}): (?=[^;,:]* [<>]= )", "", sentence)
-        .replace(" <= ", " ≤ ")
-        .replace(" >= ", " ≥ ")
+    # A name in brackets stands behind what it limits; a number of it is left only where none stands there.
+    stated = re.sub(
+        rf"( [<>]= [^;,]*)? \((?:limit )?({names})(?:, (?:{names}))*\)",
+        lambda m: m[1] or (f" ({kinds[m[2]].shown(limits[m[2]].value)})" if m[2] in limits else ""),
+        sentence,
     )
-    return re.sub(rf"\b(?:{names})\b", read, stated)
+    return re.sub(rf"\b(?:{names})\b", read, stated).replace(" <= ", " ≤ ").replace(" >= ", " ≥ ")
 
 
 def shown_value(margin: LimitMargin, value: float) -> str:

@@ -19,7 +19,7 @@ from .readiness import errors_while_running as errors_while_running
 from .readiness import range_remarks, readiness
 from .readiness import swept_angle as swept_angle
 from .readiness import usual_last as usual_last
-from .regenerated_observer import RegeneratedController as RegeneratedController
+from .regenerated_controller import RegeneratedController as RegeneratedController
 from .regenerated_observer import Regeneration, regenerate, write_regeneration
 from .watch_model import watch_plan
 from .watch_reading import read_watch

@@ -4,8 +4,6 @@ The torque that the records show is compared with what two observers make of the
 one designed from the declared model, one from the better model. Both read the same samples. The same is
 repeated with numbers drawn from what is known of them: the declared spreads before, the covariance of the
 fits after.
-
-The torque controller of the better model: what it adds, its margins, its tracking before and after.
 """
 
 from __future__ import annotations
@@ -21,23 +19,12 @@ import numpy as np
 
 from ..bench.identification import RecordSet
 from ..bench.identification.least_squares import Fit
-from ..feedback.control import (
-    ClosedLoop,
-    ScheduledTorque,
-    encoder_loop,
-    largest_torque,
-    tracking,
-    with_margin,
-)
-from ..feedback.control.laws.known_drive import KnownDrive, carried_torque, only_side, torque_at_rest
 from ..feedback.observer import (
-    CascadeGain,
     CorrectedDesign,
     FixedGrid,
     Grid,
     ObserverDesign,
     design_corrected_observer,
-    design_observer,
     design_observer_with_details,
 )
 from ..feedback.observer.scheduling.scheduled import whole_contour
@@ -48,139 +35,9 @@ from ..foundation.text_files import write_text
 from ..foundation.work_sharing import parallel_map
 from ..model import FlatModel
 from ..model.roles import measured_motion, series_spring
-from ..model.transform import with_outputs
-from ..simulation import Sine, declared_prior
-from .readiness import usual_last
+from ..simulation import declared_prior
+from .regenerated_controller import RegeneratedController, finite, regenerated_controller, rms
 from .watched_records import STAND_IN, ObserverChoice, WatchedRecord, with_numbers
-
-SHARES = (0.2, 0.6)
-"""Amplitudes of the sines over the largest torque that the declared drive can hold, up to the usual angle."""
-FREQUENCIES = (1.0, 4.0)
-"""In Hz."""
-SCATTER = 1.02
-"""Largest error over that before with which a controller is no worse."""
-GAIN = "controller.bandwidth"
-
-
-class TrackedSine(NamedTuple):
-    """Root mean square torque error on a sine of the wanted torque, in N·m; not a number in a limit cycle."""
-
-    amplitude: float  # N·m
-    frequency: float  # Hz
-    before: float
-    after: float
-
-
-@dataclass(frozen=True, eq=False)
-class RegeneratedController:
-    """The controller to take, and how the machine of the better model follows sines under both.
-
-    Parameters
-    ----------
-    controller
-        Of the better model, or of the declared one where that follows better.
-    sines
-        Under observer and controller of the declared model, and of the better one.
-    added
-        Parameters of the better controller that the declared one lacks: what it compensates.
-    margins
-        Sentence on the margins of the better controller.
-    kept
-        Why the declared controller stays; empty where it is replaced.
-    """
-
-    controller: FlatModel
-    sines: tuple[TrackedSine, ...]
-    added: tuple[str, ...]
-    margins: str
-    kept: str = ""
-
-    def words(self) -> tuple[str, ...]:
-        """Return tracking before and after, and the margins, in sentences."""
-        errors = " → ".join(three_digits(1e3 * _rms([s[place] for s in self.sines])) for place in (2, 3))
-        added = f", which also reckons with {', '.join(self.added)}" if self.added and not self.kept else ""
-        taken = self.kept or f"the controller is that of the better model{added}"
-        return (
-            f"Torque error of the better model under observer and controller, before → after: {errors} mN·m, "
-            f"over sines of {_span([s.amplitude for s in self.sines])} N·m at "
-            f"{_span([s.frequency for s in self.sines])} Hz.",
-            f"{taken[0].upper()}{taken[1:]}; {self.margins}.",
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return what stands in ``regeneration.json``."""
-        return {
-            "sines": [
-                {name: value if math.isfinite(value) else None for name, value in sine._asdict().items()}
-                for sine in self.sines
-            ],
-            "added": list(self.added),
-            "margins": self.margins,
-            "kept": self.kept,
-        }
-
-
-def _span(values: list[float]) -> str:
-    return " and ".join(f"{value:.3g}" for value in sorted(set(values)))
-
-
-def regenerated_controller(
-    declared: FlatModel, better: FlatModel, sample_time: float
-) -> RegeneratedController:
-    """Design observer and controller of both models, and let the machine of the better one follow sines.
-
-    ``declared``, ``better``: on the bench, load fixed. ``sample_time`` in s. Raises an ``NlsError`` where the
-    declared model has no controller, or the better one none.
-    """
-    before, _ = usual_controller(declared, sample_time)
-    after, margins = usual_controller(better, sample_time)
-    plant = with_outputs(better, [measured_motion(better), series_spring(better).effort])
-    old = design_observer(declared, gain=CascadeGain(), sample_time=sample_time)
-    try:
-        new = design_observer(better, gain=CascadeGain(), sample_time=sample_time)
-    except NlsError:
-        # A law that no observer holds, as of hysteresis; its controller may still follow better.
-        watched = with_numbers(declared, better.values)
-        new = design_observer(watched, gain=CascadeGain(), sample_time=sample_time)
-        margins += f"; the observer in the loop after is {STAND_IN}"
-    loops = [
-        encoder_loop(plant, observer=old, controller=before),
-        encoder_loop(plant, observer=new, controller=after),
-    ]
-    side, last = only_side(declared), usual_last(declared)
-    most = min(largest_torque(declared), abs(torque_at_rest(KnownDrive(declared), (side or 1.0) * last)))
-    sines = tuple(
-        TrackedSine(
-            share * most, frequency, *(sine_error(loop, share * most, frequency, side) for loop in loops)
-        )
-        for share in SHARES
-        for frequency in FREQUENCIES
-    )
-    kept = ""
-    errors = [_rms([sine[place] for sine in sines]) for place in (2, 3)]
-    if not errors[1] <= SCATTER * errors[0] and math.isfinite(errors[0]):
-        kept = "the controller stays that of the declared model, which follows better"
-    added = tuple(sorted(set(after.values) - set(before.values)))
-    return RegeneratedController(before if kept else after, sines, added, margins, kept)
-
-
-def usual_controller(model: FlatModel, sample_time: float) -> tuple[FlatModel, str]:
-    """Return the controller that is generated where nobody states a gain, and a sentence on its margins."""
-    return with_margin(
-        model, GAIN, last=usual_last(model), given=False, sample_time=sample_time, law=ScheduledTorque()
-    )
-
-
-def sine_error(loop: ClosedLoop, amplitude: float, frequency: float, side: float) -> float:
-    """Return the torque error over the last period of a sine; not a number in a limit cycle."""
-    stop = 3.0 / frequency
-    wanted = Sine(amplitude, frequency, offset=1.25 * side * amplitude)
-    run = loop.run(stop, inputs={loop.desired: wanted})
-    # What rubs in the tie of the spring is no torque of the spring: neither sensor nor observer has it.
-    carried = run[f"plant.{carried_torque(KnownDrive(loop.plant))}"]
-    run = run.with_signals({loop.torque: carried}, {})
-    return tracking(loop, run, settled=stop - 1.0 / frequency).rms_error
-
 
 DRAWS = 8
 """Draws of the numbers, before and after each: enough for a root mean square over the spread."""
@@ -232,6 +89,9 @@ class Regeneration:
         Time, measured torque, and both estimates on the first of these records.
     controller
         The torque controller, and how the machine follows under it; ``None`` where there is none.
+    replaced
+        Of the declared model's observers the one that errs least on the records that decide; ``None`` where
+        nothing was compared.
     """
 
     plant: FlatModel
@@ -246,6 +106,7 @@ class Regeneration:
     spread_after: tuple[float, ...] = ()
     course: tuple[Array, Array, Array, Array] | None = None
     controller: RegeneratedController | None = None
+    replaced: FlatModel | None = None
 
     @property
     def nominal(self) -> tuple[float, float]:
@@ -260,7 +121,7 @@ class Regeneration:
     @property
     def over_spread(self) -> tuple[float, float]:
         """Error over all records and draws, before and after."""
-        return _rms(self.spread_before), _rms(self.spread_after)
+        return rms(self.spread_before), rms(self.spread_after)
 
     def words(self) -> tuple[str, ...]:
         """Return the torque error before and after in sentences; none where nothing was compared."""
@@ -289,10 +150,10 @@ class Regeneration:
         return {
             "quantity": self.quantity,
             "unit": self.unit,
-            "nominal": dict(zip(keys, map(_finite, self.nominal), strict=True)),
-            "over_spread": dict(zip(keys, map(_finite, self.over_spread), strict=True)),
+            "nominal": dict(zip(keys, map(finite, self.nominal), strict=True)),
+            "over_spread": dict(zip(keys, map(finite, self.over_spread), strict=True)),
             "draws": {"before": list(self.spread_before), "after": list(self.spread_after)},
-            "corrected": dict(zip(keys, map(_finite, self.learning), strict=True)),
+            "corrected": dict(zip(keys, map(finite, self.learning), strict=True)),
             "records": [each._asdict() for each in self.errors],
             "corrected_records": [each._asdict() for each in self.corrected],
             "chosen": self.chosen,
@@ -303,15 +164,7 @@ class Regeneration:
 
 def _over_records(errors: Sequence[ObserverTorqueError]) -> tuple[float, float]:
     """Return the error over all records, before and after."""
-    return _rms([e.before for e in errors]), _rms([e.after for e in errors])
-
-
-def _rms(values: Sequence[float]) -> float:
-    return math.sqrt(math.fsum(v * v for v in values) / len(values)) if values else math.nan
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return rms([e.before for e in errors]), rms([e.after for e in errors])
 
 
 def regenerate(
@@ -346,9 +199,12 @@ def regenerate(
     """
     choice = choice or ObserverChoice()
     result = regenerated_observer(declared, better, records, fits=fits, choice=choice, progress=progress)
+    if result.observer is None:
+        return result
     progress("designing the controllers, and following sines under both")
     try:
-        controller = regenerated_controller(declared, better, choice.sample_time)
+        old = result.replaced or _designed(declared, choice).model
+        controller = regenerated_controller(declared, better, (old, result.observer), choice.sample_time)
     except NlsError as error:
         return replace(result, reasons=(*result.reasons, f"no controller is compared: {error}"))
     return replace(result, controller=controller)
@@ -381,8 +237,7 @@ def regenerated_observer(
     deciding = [seen[r.name] for r in records.of("selection") or records.of("fit") or records.records]
     progress("designing the observers that learn")
     learned = [_learning(model, choice) for model in (declared, watched)]
-    both = [each for each in learned if not isinstance(each, str)]
-    generated, chosen = _generated((before, after), both if len(both) == 2 else [], deciding)
+    generated, chosen, replaced = _generated((before, after), learned, deciding)
     corrected, lacking = _compared(learned, runs)
     pairs = [(run.estimate(before), run.estimate(after)) for run in runs]
     errors = tuple(
@@ -391,7 +246,7 @@ def regenerated_observer(
     )
     progress("designing observers over the spread of the numbers")
     draws = [*_draws(declared, ()), *_draws(better, fits)]
-    models = [*[declared] * DRAWS, *[watched] * DRAWS]
+    models = [declared] * DRAWS + [watched] * DRAWS
     spread = list(parallel_map(lambda k: _drawn_error(models[k], draws[k], runs, choice), 2 * DRAWS))
     return Regeneration(
         better,
@@ -403,6 +258,7 @@ def regenerated_observer(
         spread_before=tuple(e for e in spread[:DRAWS] if math.isfinite(e)),
         spread_after=tuple(e for e in spread[DRAWS:] if math.isfinite(e)),
         course=(runs[0].trace.time, runs[0].torque, *pairs[0]),
+        replaced=replaced.model,
         **known,
     )
 
@@ -469,36 +325,39 @@ def _compared(
 
 def _generated(
     cascades: tuple[ObserverDesign, ObserverDesign],
-    corrected: Sequence[CorrectedDesign],
+    learned: Sequence[CorrectedDesign | str],
     deciding: Sequence[WatchedRecord],
-) -> tuple[ObserverDesign | CorrectedDesign, str]:
-    """Return the observer that errs least on the records that decide, and why in words.
+) -> tuple[ObserverDesign | CorrectedDesign, str, ObserverDesign | CorrectedDesign]:
+    """Return the observer that errs least on the records that decide, why in words, and the declared best.
 
-    It is one of the declared model where none of the better model errs less: what is worse replaces nothing.
-    ``corrected``: those of the declared and of the better model, or none.
+    The first is one of the declared model where none of the better model errs less: what is worse replaces
+    nothing.
+    ``learned``: the corrected ones of the declared and of the better model, or why there is none.
     """
     named: list[tuple[str, ObserverDesign | CorrectedDesign, ObserverDesign | CorrectedDesign]] = [
         ("cascade", *cascades)
     ]
-    if corrected and not any(run.lacks(each) for run in deciding for each in corrected):
+    corrected = [each for each in learned if not isinstance(each, str)]
+    if len(corrected) == 2 and not any(run.lacks(each) for run in deciding for each in corrected):
         named.append(("corrected observer", corrected[0], corrected[1]))
     errors = [
-        [_rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
+        [rms([run.error(run.estimate(design)) for run in deciding]) for design in both] for _, *both in named
     ]
     best = min(range(len(named)), key=lambda k: errors[k][1])
     replaced = min(range(len(named)), key=lambda k: errors[k][0])
     roles = ", ".join(sorted({run.record.role.replace("_", " ") for run in deciding}))
     share = 1.0 - errors[replaced][0] / max(errors[best][1], 1e-300)
     if share > TIE:
-        name = named[replaced][0]
-        return named[replaced][1], (
+        name, old, _ = named[replaced]
+        words = (
             f"{name} of the declared model, which is not replaced: on the records that decide ({roles}) it "
             f"errs by {100.0 * share:.2g} % less than those of the better model"
         )
+        return old, words, old
     name, _, design = named[best]
-    if len(named) == 1:
-        return design, name
-    return design, f"{name}: it errs less on the records that decide ({roles}) than the other"
+    if len(named) > 1:
+        name += f": it errs less on the records that decide ({roles}) than the other"
+    return design, name, named[replaced][1]
 
 
 def _failures(spread: Sequence[float]) -> tuple[str, ...]:
@@ -534,7 +393,7 @@ def _drawn_error(
     ends = whole_contour(drawn)
     try:
         design = _designed(drawn, choice, FixedGrid(ends.lower, ends.upper, _POINTS))
-        return _rms([run.error(run.estimate(design)) for run in runs])
+        return rms([run.error(run.estimate(design)) for run in runs])
     except NlsError:
         return math.nan
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import ItemsView, Iterable, Iterator, KeysView, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -85,9 +85,38 @@ def _si_unit(name: str, units: Mapping[str, str]) -> str:
     return unit
 
 
+class _NamedSignals:
+    """What a mapping from name to signal has; its length is for each class to say."""
+
+    signals: Mapping[str, Array]
+    name: str
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one signal."""
+        if name not in self.signals:
+            raise unknown_name("signal", name, self.signals)
+        return self.signals[name]
+
+    def __contains__(self, name: object) -> bool:
+        """Tell whether there is a signal of that name."""
+        return name in self.signals
+
+    def __iter__(self) -> Iterator[str]:
+        """Yield the names of the signals."""
+        return iter(self.signals)
+
+    def keys(self) -> KeysView[str]:
+        """Return the names of the signals."""
+        return self.signals.keys()
+
+    def items(self) -> ItemsView[str, Array]:
+        """Return the names of the signals, each with its values."""
+        return self.signals.items()
+
+
 @dataclass(frozen=True, eq=False)
-class Trace:
-    """Signals sampled at common times, simulated or measured.
+class Trace(_NamedSignals):
+    """Signals sampled at common times, simulated or measured, by name; the length is that of the time.
 
     Parameters
     ----------
@@ -124,16 +153,6 @@ class Trace:
                     f"signal '{signal}' of '{self.name}'",
                     f"has {values.shape} samples, time has {self.time.shape}",
                 )
-
-    def __getitem__(self, name: str) -> Array:
-        """Return one signal."""
-        if name not in self.signals:
-            raise unknown_name("signal", name, self.signals)
-        return self.signals[name]
-
-    def __contains__(self, name: object) -> bool:
-        """Tell whether there is a signal of that name."""
-        return name in self.signals
 
     def __len__(self) -> int:
         """Return the number of samples."""

@@ -162,8 +162,8 @@ class RankedPoints:
     failed: Mask  # points without an answer, shape (n,)
     missed: Mask  # points with an answer that does not keep a requirement
     incomplete: Mask  # points that keep all requirements, with an answer to compare that is no finite number
-    # front: indices of the points that no other betters in all preferences, the best in the first one first;
-    # empty without preferences
+    # front: indices of the points on which no other improves in all preferences, the best in the first one
+    # first; empty without preferences
     front: Indices
     misses: tuple[int, ...]  # how many points miss each requirement, in their order
 
@@ -186,7 +186,7 @@ def rank_points(
     preferences: Sequence[Preference] = (),
     requirements: Sequence[Requirement] = (),
 ) -> RankedPoints:
-    """Return which points no other betters; failures, misses and what is no finite number are set aside.
+    """Return on which points no other improves; failures, misses and what is no finite number are set aside.
 
     ``preferences``: what is better; a point is on the front where no other is at least as good in all and
     better in one.

@@ -105,14 +105,14 @@ def _check_curvature(contour: Contour, cable_radius: float) -> None:
         raise ValueRangeError(
             f"contour {place}",
             f"is concave there (radius of curvature {MM * radii[index]:.4g} mm); a taut cable lifts off",
-            next_step="design with MinimumRadiusOfCurvature above the cable's radius",
+            next_step="ask for a radius of curvature above that of the cable (MinimumRadiusOfCurvature)",
         )
     if radii[index] < cable_radius + ACCURACY:
         raise ValueRangeError(
             f"cable radius {MM * cable_radius:g} mm",
             f"the cable is thicker than the sharpest radius under its centre line, "
             f"{MM * radii[index]:.4g} mm {place}",
-            next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
+            next_step="take a thinner cable, or ask for a larger radius (MinimumRadiusOfCurvature)",
         )
 
 

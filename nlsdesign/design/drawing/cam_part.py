@@ -169,7 +169,7 @@ def _check_tool(part: CamPart) -> None:
         raise ValueRangeError(
             f"edge under the {part.counterpart}, with a radius of {MM * sharpest:.3g} mm at its sharpest",
             f"is a corner within its tolerance of {MM * tolerance:.3g} mm",
-            next_step="take a larger MinimumRadiusOfCurvature, or a thinner cable",
+            next_step="ask for a larger radius (MinimumRadiusOfCurvature), or take a thinner cable",
         )
     tool = part.number("tool_radius")
     inner = np.concatenate([outline.radii for outline in part.outlines])

@@ -154,7 +154,7 @@ class MachinedRollerCam(MachinedRollingCam):
                 f"is undercut: the centre of the roller of {MM * r:.4g} mm radius turns with "
                 f"{MM * turns:.4g} mm at {math.degrees(contour.bearings[worst]):.3g}°",
                 next_step=f"take a roller of at most {MM * turns:.3g} mm radius, a larger base radius, "
-                "or design with MinimumRadiusOfCurvature",
+                "or limit the radius of curvature (MinimumRadiusOfCurvature)",
             )
         how = "smallest radius of curvature of the edge"
         numbers["sharpest_edge"] = derived_size(float(np.min(rho, where=rho > 0.0, initial=STRAIGHT)), how)

@@ -242,6 +242,7 @@ def design_summary(design: CamDesign) -> dict[str, Any]:
         "advice": [] if design.miss is None else list(design.miss.advice),
         "values": {name: quantity.value for name, quantity in design.values.items()},
         "active_limits": list(design.active_limits),
+        "limits_reached": list(design.limits_reached),
         "largest_cable_force": _rounded(float(design.curves.forces.max())),
         "energy": _rounded(design.curves.energy),
     }
@@ -261,9 +262,9 @@ def trim_remarks(design: CamDesign) -> Iterator[str]:
                 factor = parse_unit(state.unit).factor
                 needed = with_unit(f"{low / factor:.4g} to {high / factor:.4g}", state.unit)
                 yield (
-                    f"{state.limit} holds for the nominal spring: to trim 95 % of the made ones, {trim.name} "
-                    f"is set from {needed}, beyond {in_unit(state.bound, state.unit)} -> leave it that "
-                    "travel, or narrow the spreads"
+                    f"the limit {in_unit(state.bound, state.unit)} of {trim.name} ({state.limit}) "
+                    f"holds for the nominal spring; to trim 95 % of the made ones it is set "
+                    f"from {needed} -> leave it that travel, or narrow the spreads"
                 )
 
 

@@ -177,13 +177,22 @@ class Search:
             )
 
 
+_SPANS = 3
+"""Ranges of the angle that are listed; of more their number is said."""
+
+
 def spans_of(angles: Array, where: Mask) -> str:
-    """Return the ranges of the angle in which something holds, in words."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], where, [False]]).astype(int)))
+    """Return the ranges of the angle in which something holds, in words; a single node between two counts."""
+    padded = np.concatenate([[False], where, [False]])
+    padded[1:-1] |= padded[:-2] & padded[2:]
+    edges = np.flatnonzero(np.diff(padded.astype(int)))
     words = []
     for first, behind in zip(edges[::2], edges[1::2], strict=True):
         low, high = (f"{np.degrees(angles[i]):.3g}" for i in (first, behind - 1))
         words.append(f"at {low}°" if low == high else f"from {low}° to {high}°")
+    if len(words) > _SPANS:
+        low, high = (f"{np.degrees(angles[i]):.3g}" for i in (edges[0], edges[-1] - 1))
+        return f"in {len(words)} places from {low}° to {high}°"
     return " and ".join(words)
 
 

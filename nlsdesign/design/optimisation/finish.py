@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -13,7 +13,7 @@ import numpy as np
 from ...components.assembly.named_parts import Assembly
 from ...foundation.arrays import Array
 from ...foundation.errors import NlsError
-from ...foundation.quantity import Quantity, significant
+from ...foundation.quantity import MM, Quantity, significant
 from ...model import FlatModel, flatten
 from ...model.origin import derived
 from ..curves.target import Target
@@ -25,7 +25,7 @@ from ..tolerance.tolerance_result import ToleranceResult
 from .coil_limits import side_forces
 from .defaults import safe_limits
 from .design_search import Search, carried_over, same_design, spans_of
-from .limits import Bound
+from .limits import Bound, limits_in_words
 from .problem import DesignProblem
 from .program import Solution
 from .remedies import Remedies, find_remedies
@@ -181,14 +181,16 @@ def finished(solved: SolvedSearch) -> CamDesign:
     sentences = []
     if cam.rolling is None and "MaximumCableTension" not in kinds:
         sentences.append(
-            f"{cam.name} declares no cable and no MaximumCableTension is asked for: nothing limits it"
+            f"{cam.name} declares no cable, and none of its tension is limited (MaximumCableTension)"
         )
     if cam.specimens and not {"MaximumStress", "MaximumStrain"} & kinds:
         sentences.append(
-            "no strength of the rubber is declared, no MaximumStress or MaximumStrain is asked for"
+            "no strength of the rubber is declared, no largest stress or strain of it is asked for "
+            "(MaximumStress, MaximumStrain)"
         )
     if cam.coils and "GoodmanSafety" not in kinds:
         sentences.append("wire and strength of the coil are not declared: nothing limits what the wire bears")
+    sentences += _unlimited_pair(solved, kinds)
     sentences += side_forces(design, lambda each: problem.evaluate(each, best.point))
     sentences += [f"{at}.{text}" for at, part in solved.changed.walk() for text in part.remarks()]
     return CamDesign(
@@ -260,7 +262,7 @@ def _miss(solved: SolvedSearch, limits: Sequence[LimitState]) -> Miss | None:
         allowed=settings.largest_error,
         worst_angle=float(check.angles[worst]),
         worst_error=float(check.errors[worst]),
-        binding=tuple(dict.fromkeys(state.limit for state in limits if state.active)),
+        binding=limits_in_words((state.limit, state.of) for state in limits if state.active),
         remedies=remedies,
         advice=advice,
     )
@@ -296,6 +298,26 @@ def _ends(solved: SolvedSearch) -> Iterator[str]:
                 yield f"{variable.name} = {value} is the end of its range, no limit of yours: bound it"
 
 
+_PAIR_SIZE = 2.0
+"""Radius of a cam that rolls on its mirror image, over the length of the element between the pivots without
+load, from which its size is remarked. Assumed; the joints of Wu and Mintchev 2024 have 1.04 to 1.10."""
+
+
+def _unlimited_pair(solved: SolvedSearch, kinds: Container[str]) -> Iterator[str]:
+    """Yield how large a rolling pair came out where no limit keeps its smooth profile from growing."""
+    cam, values = solved.search.problem.law.cam, solved.model.values
+    if cam.rolling is None or cam.rolling.radius is not None or "MaximumCamRadius" in kinds:
+        return
+    enough = _PAIR_SIZE * max(values[name] for name in cam.lengths)
+    if solved.contour_fit[0].radii.max() > enough:
+        yield (
+            "nothing limits the size of this pair: its pivots are "
+            f"{MM * values[cam.rolling.base]:.3g} mm apart at angle zero -> limit the cam radius, "
+            f'MaximumCamRadius = {{radius = "{MM * enough:.3g} mm"}} for '
+            "instance, twice the length of its element"
+        )
+
+
 def _beyond_defaults(solved: SolvedSearch) -> Iterator[str]:
     """Yield the limits of the declared cable and rubber that were replaced and that the design breaks."""
     problem, question = solved.search.problem, solved.search.question
@@ -329,8 +351,8 @@ def _blocks(solved: SolvedSearch) -> Iterator[str]:
             yield (
                 f"{piece.name}: {1e3 * length:.3g} mm long with {1e6 * width * thickness:.4g} mm² of section "
                 f"is a block, no strip: clamped ends make it about {1.0 + stiffer:.2g} times as stiff as its "
-                f"law says -> ask for a longer one (RestLengthRange), more elements or thinner strips, or "
-                f"measure it"
+                f"law says -> ask for a longer one (limit RestLengthRange), more elements or thinner strips, "
+                "or measure it"
             )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -48,7 +48,15 @@ class Bound:
         return in_unit(self.read(value), self.unit)
 
     def __str__(self) -> str:
-        return f"{self.limit}: {self.of} {'<=' if self.at_most else '>='} {self.shown(self.value)}"
+        return f"{self.of} {'<=' if self.at_most else '>='} {self.shown(self.value)}"
+
+
+def limits_in_words(pairs: Iterable[tuple[str, str]]) -> tuple[str, ...]:
+    """Return what limits bound, each with its name in brackets; of pairs of name and what it bounds."""
+    what: dict[str, dict[str, None]] = {}
+    for limit, of in pairs:
+        what.setdefault(limit, {})[of] = None
+    return tuple(f"{' and '.join(of)} ({limit})" for limit, of in what.items())
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,11 @@ class Give:
         ratio = self.moved / self.bound.value
         return ratio <= _MOST_RAISED if self.bound.upper else ratio >= 1.0 / _MOST_RAISED
 
+    @property
+    def named(self) -> str:
+        """How far, with the name of the limit: for who was not told it yet."""
+        return f"{self} ({self.bound.limit})"
+
     def __str__(self) -> str:
         bound = self.bound
         moved = bound.read(self.moved)

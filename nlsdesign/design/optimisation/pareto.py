@@ -32,7 +32,7 @@ from .defaults import DesignSettings
 from .design_search import Search
 from .finish import SolvedSearch, finished, limit_state
 from .goals import Goal, GoalMeasure, SmoothContour
-from .limits import Limit, MaximumTorqueError
+from .limits import Limit, MaximumTorqueError, limits_in_words
 from .program import Program, Rows, Solution
 from .remedies import feasible_point
 from .result import CamDesign
@@ -48,7 +48,7 @@ class FrontPoint(NamedTuple):
     values: tuple[float, ...]  # the goals, in SI
     numbers: tuple[tuple[str, float], ...]  # free numbers in SI by full name, besides the contour
     units: tuple[str, ...]  # SI units of these
-    binding: tuple[str, ...]  # names of the limits on which the design sits
+    binding: tuple[str, ...]  # what limits bound on which the design sits, with their names
 
 
 class LeftOut(NamedTuple):
@@ -347,7 +347,7 @@ class _Ladder:
                 raise ConvergenceError(
                     f"pareto: {type(self.goals[goal]).__name__} alone",
                     f"IPOPT stopped with '{solved[-1].outcome.status}'",
-                    next_step="free one number more, or bound the sizes, for instance with RestLengthRange",
+                    next_step="free one number more, or bound the sizes, as by a RestLengthRange",
                 )
             reached.append(min(solved, key=lambda each: each.outcome.cost))
         return reached
@@ -443,7 +443,7 @@ def _point(search: Search, tried: _Tried) -> FrontPoint:
         values=tuple(float(v) for v in tried.values),
         numbers=tuple((name, values[name]) for name in names),
         units=tuple(search.question.model.variable(name).unit for name in names),
-        binding=tuple(dict.fromkeys(state.limit for state in states if state.active)),
+        binding=limits_in_words((state.limit, state.of) for state in states if state.active),
     )
 
 

@@ -7,7 +7,7 @@ Why no design keeps all limits: which are in conflict, how much each would have 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import casadi as ca
@@ -18,7 +18,7 @@ from ...foundation.arrays import Array
 from ...foundation.errors import ConvergenceError, InfeasibleError, NlsError
 from ..statics.declared_cam import as_pair, declared_cam, one_sided, with_roller
 from .design_search import Search, row_of, spans_of
-from .limits import Bound, MaximumCableTension, MinimumRadiusOfCurvature
+from .limits import MaximumCableTension, MinimumRadiusOfCurvature, limits_in_words
 from .loosening import FEASIBLE, Freed, Give, Loosened
 from .program import PROVED_INFEASIBLE, Program, Rows, Solution
 from .shape import starts
@@ -45,7 +45,7 @@ class OtherSpring:
 
     def __str__(self) -> str:
         besides = [] if self.freed is None else [str(self.freed)]
-        return ", ".join([f"take {self.words}", *besides, *map(str, self.gives)])
+        return ", ".join([f"take {self.words}", *besides, *(give.named for give in self.gives)])
 
 
 def percent(error: float, largest: float) -> str:
@@ -133,7 +133,7 @@ class Hollow:
     def __str__(self) -> str:
         besides = "" if self.freed is None else f" ({self.freed} besides)"
         return (
-            f"ConvexContour: the contour would have to be hollow {self.spans}, with radii of curvature "
+            f"the contour would have to be hollow {self.spans} (ConvexContour), with radii of curvature "
             f"down to {1e3 * self.deepest:.3g} mm{besides}; {self.what}"
         )
 
@@ -205,7 +205,7 @@ class Remedies:
         """Return the advice as sentences; ``allowed``: the largest rms error in N·m."""
         sentences = [f"{freed}: {percent(freed.error, largest)}" for freed in self.enough]
         for give, also in self.gives:
-            sentences.append(f"{give}" + ("" if also is None else f", and {also}"))
+            sentences.append(give.named + ("" if also is None else f", and {also}"))
         others = [f"{one}: {percent(one.error, largest)}" for one in self.others if one.error <= allowed]
         if others and self.hollow is not None:
             sentences.append(str(self.hollow))
@@ -287,9 +287,9 @@ def feasible_point(search: Search, free: Sequence[str]) -> Array:
     if loose.kept(best):
         return search.problem.completed(loose.open.problem.chosen(best.point))
     prices = best.prices[len(loose.open.problem.structure) :]
-    involved = [i for i, price in enumerate(prices) if price > _INVOLVED]
+    bounds, involved = loose.bounds, [i for i, price in enumerate(prices) if price > _INVOLVED]
     raise InfeasibleError(
-        "limits " + ", ".join(names_of(loose.bounds[i] for i in involved)),
+        "limits of " + ", ".join(limits_in_words((bounds[i].limit, bounds[i].of) for i in involved)),
         "contradict each other" if len(involved) > 1 else "cannot be kept with what is free",
         next_step="; ".join(what_would_help(loose, best, involved, search, free)),
     )
@@ -302,14 +302,14 @@ def what_would_help(
     start = best.point[: loose.count]
     alone = loose.several([((), [i]) for i in involved], start)
     gives = [loose.give(i, outcome) for i, outcome in zip(involved, alone, strict=True) if outcome.solved]
-    failed = {loose.bounds[i].limit: o for i, o in zip(involved, alone, strict=True) if not o.solved}
+    failed = {loose.bounds[i].of: o for i, o in zip(involved, alone, strict=True) if not o.solved}
     undecided = [limit for limit, outcome in failed.items() if outcome.status != PROVED_INFEASIBLE]
     hopeless = [limit for limit in failed if limit not in undecided]
     tried = loose.sizes_tried(start)
     largest = search.question.target.largest
     together = [give for give in (loose.give(i, best) for i in involved) if give.amount > 0.0]
     sensible = [give for give in gives if give.sensible]
-    no_use = [*hopeless, *names_of(give.bound for give in gives if not give.sensible)]
+    no_use = dict.fromkeys([*hopeless, *(give.bound.of for give in gives if not give.sensible)])
     sentences = []
     if sensible:
         sentences.append("one of these is enough: " + "; or ".join(str(give) for give in sensible))
@@ -325,8 +325,3 @@ def what_would_help(
         listed = " or ".join(undecided)
         sentences.append(f"whether a give of {listed} alone is enough the solver could not decide")
     return sentences if sensible or tried.enough else [*sentences, *tried_otherwise(loose, search, free)]
-
-
-def names_of(bounds: Iterable[Bound]) -> list[str]:
-    """Return the names of the limits of some bounds, each once."""
-    return list(dict.fromkeys(bound.limit for bound in bounds))

@@ -20,6 +20,7 @@ from ..drawing.cam_drawing import fingerprint
 from ..statics.contour import Contour
 from ..tolerance.tolerance_result import ToleranceResult
 from .design_search import spans_of
+from .limits import limits_in_words
 from .remedies import Remedies
 from .size_ranges import SizeRange
 
@@ -59,7 +60,7 @@ class LimitState:
         sign = "<=" if self.upper else ">="
         mark = f"  ACTIVE {self.where}".rstrip() if self.active else ""
         value, bound = in_unit(self.value, self.unit), in_unit(self.bound, self.unit)
-        return f"{self.limit}: {self.of} {value} {sign} {bound}{mark}"
+        return f"{self.of} {value} {sign} {bound} ({self.limit}){mark}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +153,7 @@ class Miss:
     # in N·m
     worst_angle: float
     worst_error: float
-    binding: tuple[str, ...]  # limits that the design sits on
+    binding: tuple[str, ...]  # limits that the design sits on: what each bounds, and its name
     remedies: Remedies | None  # what would help; None where it was not looked for
     advice: tuple[str, ...]  # the same as sentences
 
@@ -258,6 +259,11 @@ class CamDesign:
     def active_limits(self) -> tuple[str, ...]:
         """Names of the limits that the design sits on."""
         return tuple(dict.fromkeys(state.limit for state in self.limits if state.active))
+
+    @property
+    def limits_reached(self) -> tuple[str, ...]:
+        """What the limits bound that the design sits on, each with its name."""
+        return limits_in_words((state.limit, state.of) for state in self.limits if state.active)
 
     @property
     def within_tolerance(self) -> float | None:
@@ -396,7 +402,7 @@ def _curvature(design: CamDesign) -> str:
     if not edge.any():
         rho = design.contour.radii_of_curvature
         return f"{1e3 * rho.min():.3g} to {1e3 * rho.max():.3g} mm"
-    where = f"an edge {spans_of(curves.angles, edge)}, where ConvexContour binds"
+    where = f"an edge {spans_of(curves.angles, edge)}, where convexity binds (ConvexContour)"
     return where if edge.all() else f"{where}; up to {1e3 * curves.radii_of_curvature.max():.3g} mm elsewhere"
 
 

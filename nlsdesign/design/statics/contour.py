@@ -141,7 +141,7 @@ class Contour:
             raise ValueRangeError(
                 f"cable radius {1e3 * cable_radius:g} mm",
                 f"must not exceed the sharpest radius under the cable, {1e3 * sharpest:.4g} mm",
-                next_step="take a thinner cable or a larger MinimumRadiusOfCurvature",
+                next_step="take a thinner cable, or ask for a larger radius (MinimumRadiusOfCurvature)",
             )
         normals = np.column_stack([np.sin(self.directions), np.cos(self.directions)])
         return self.points - cable_radius * normals

@@ -71,8 +71,8 @@ class PointKinds:
     """What the points of a figure are."""
 
     points: NDArray[np.int64]  # numbers of the points, shape (n,)
-    # front, missed, failed: which no other betters, which keep not all requirements, which have no answer; no
-    # point is two of them
+    # front, missed, failed: on which no other improves, which keep not all requirements, which have no
+    # answer; no point is two of them
     front: Mask
     missed: Mask
     failed: Mask

@@ -145,7 +145,7 @@ def _key_numbers(design: CamDesign) -> tuple[KeyNumber, ...]:
         KeyNumber("largest error", prefixed(design.check.largest), "exact numbers"),
         KeyNumber(f"{pulled} force", prefixed(float(design.curves.forces.max()), "N"), "largest"),
         KeyNumber(
-            "limits reached", str(len(design.active_limits)), ", ".join(design.active_limits) or "none"
+            "limits reached", str(len(design.active_limits)), ", ".join(design.limits_reached) or "none"
         ),
     ]
     if design.tolerance is not None and design.tolerance.causes:

@@ -383,11 +383,11 @@ def regeneration_sections(result: Regeneration, files: Mapping[Path, str]) -> li
             )
         )  # fmt: skip
     if result.controller:
-        rows = [tuple(three_digits(value) for value in sine) for sine in result.controller.sines]
+        rows = [sine.shown() for sine in result.controller.sines]
         columns = ("amplitude in N·m", "frequency in Hz", "before in N·m", "after in N·m")
         caption = (
-            "Root mean square torque error of the better model over the last period of a sine of the wanted "
-            "torque, under observer and controller of the declared and of the better model. "
+            "Root mean square torque error of the better model over the last periods of a sine of the wanted "
+            "torque, under observer and controller of the declared model and those of the better one. "
             f"{result.controller.words()[1]}"
         )
         sections.append(TableSection("Tracking of the torque", columns, tuple(rows), caption=caption))

@@ -98,7 +98,9 @@ def key_figures(results: Sequence[ComparedResult]) -> dict[str, list[str]]:
         "torque error, exact numbers": lambda r: _scaled(r.design.get("torque_error_rms"), 1e3, "mN*m"),
         "largest cable force": lambda r: _scaled(r.design.get("largest_cable_force"), 1.0, "N"),
         "energy": lambda r: _scaled(r.design.get("energy"), 1.0, "J"),
-        "limits reached": lambda r: ", ".join(r.design.get("active_limits", ())) or _NONE,
+        "limits reached": lambda r: (
+            ", ".join(r.design.get("limits_reached", r.design.get("active_limits", ()))) or _NONE
+        ),
         "verdict": lambda r: str(r.verdict.get("verdict", _NONE)).replace("_", " "),
         "finding": lambda r: str(r.verdict.get("headline", _NONE)),
         "error before": lambda r: _error(r, "before"),

@@ -1,4 +1,4 @@
-"""The page of a sweep: what was asked, what failed, which points no other betters, figures, decks.
+"""The page of a sweep: what was asked, what failed, on which points no other improves, figures, decks.
 
 The command and the front door import it. It computes no answers and draws nothing itself: `sweeps` judges the
 points, `figures` draws them.

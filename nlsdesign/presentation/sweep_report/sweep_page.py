@@ -93,7 +93,7 @@ class SweepPage(NamedTuple):
     page: Path
     points: Path  # table of all points, as CSV
     decks: dict[int, Path]  # decks of the points in the table of the page, by number
-    # front: numbers of the points that no other betters, the best in the first direction first
+    # front: numbers of the points on which no other improves, the best in the first direction first
     front: tuple[int, ...]
     remarks: tuple[str, ...]  # what the reader should know, one sentence each
 

@@ -23,7 +23,8 @@ __all__ = ["run", "undrawn"]
 pytestmark = pytest.mark.usefixtures("undrawn")
 SOFT, STIFF = "austin2015_soft_spring", "austin2015_stiff_spring"
 DESIGN = {
-    "met": True, "torque_error_rms": 0.0123, "miss": None, "active_limits": ["MaximumCamRadius"],
+    "met": True, "torque_error_rms": 0.0123, "miss": None,
+    "limits_reached": ["cam radius (MaximumCamRadius)"],
     "largest_cable_force": 215.0, "energy": 1.5, "rms_error_over_spreads": {"95 %": 0.5},
 }  # fmt: skip
 VERDICT = {

@@ -49,7 +49,7 @@ def test_a_limit_of_the_same_kind_takes_its_place_and_a_looser_one_is_remarked()
     loose = designed(MaximumLastingStrain(1.5))
     assert at_rest(loose) > 1.05
     (remark,) = [each for each in loose.remarks if "beyond what the declared" in each]
-    assert "MaximumLastingStrain: strain at rest of spring.rubber" in remark
+    assert "strain at rest of spring.rubber" in remark
 
 
 def test_it_holds_where_something_is_known_of_the_rubber() -> None:

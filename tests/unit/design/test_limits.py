@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from inspect import isabstract
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -31,7 +33,7 @@ from nlsdesign.design import (
     design_cam,
 )
 from nlsdesign.design.optimisation import limits
-from nlsdesign.design.optimisation.design_search import row_of
+from nlsdesign.design.optimisation.design_search import row_of, spans_of
 from nlsdesign.design.optimisation.problem import design_problem
 from nlsdesign.design.optimisation.program import Program, Rows
 from nlsdesign.design.optimisation.shape import Start
@@ -51,6 +53,14 @@ def test_every_limit_of_the_package_is_handed_out() -> None:
     names = {kind.__name__ for kind in own if not isabstract(kind)}
     assert "MaximumCamRadius" in names
     assert not names - set(design.__all__), "add them to nlsdesign/design/__init__.py"
+
+
+def test_every_curve_limit_and_goal_stands_in_a_how_to(root: Path) -> None:
+    pages = "".join(page.read_text(encoding="utf-8") for page in (root / "docs" / "how_to").glob("*.md"))
+    bases = (Limit, design.Target, design.Goal, design.TaskGoal)
+    names = {name for base in bases for name in design.kinds(base) if name in design.__all__}
+    assert len(names) > 30
+    assert not {name for name in names if not re.search(rf"\b{name}\b", pages)}
 
 
 @pytest.mark.parametrize(
@@ -98,7 +108,7 @@ def test_each_limit_says_what_it_bounds(limit: Limit, text: str) -> None:
     )
     start = problem.at(Start(0.5, 0.3, {}))
     first, *rest = limit.bounds(problem.design)
-    assert str(first) == f"{type(limit).__name__}: {text}"
+    assert (first.limit, str(first)) == (type(limit).__name__, text)
     assert len(rest) == (1 if hasattr(limit, "maximum") else 0)
     # The row is the distance from the bound in units of its scale; a slack of 1 gives way by one scale.
     row = row_of(first)
@@ -162,3 +172,17 @@ def test_a_program_without_anything_to_make_small_is_solved() -> None:
     solution = program.solve(np.array([1.0]))
     assert solution.solved
     assert solution.point[0] == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(
+    ("nodes", "words"),
+    [
+        ((0, 1, 2), "from 0° to 2°"),
+        ((0, 2, 4, 8), "from 0° to 4° and at 8°"),
+        ((0, 3, 6), "at 0° and at 3° and at 6°"),
+        ((1, 4, 7, 8, 11), "in 4 places from 1° to 11°"),
+    ],
+)
+def test_where_something_holds_is_said_in_few_ranges(nodes: tuple[int, ...], words: str) -> None:
+    angles = np.radians(np.arange(13.0))
+    assert spans_of(angles, np.isin(np.arange(13), nodes)) == words

@@ -58,7 +58,7 @@ def test_a_miss_says_how_far_where_why_and_what_to_free() -> None:
     assert missed.miss.worst_angle == missed.check.angles[worst]
     assert missed.miss.worst_error == missed.check.errors[worst]
     assert "MISSES ITS TARGET: 4.86 % rms" in str(missed)
-    assert "MinimumRadiusOfCurvature" in missed.miss.binding
+    assert "radius of curvature (MinimumRadiusOfCurvature)" in missed.miss.binding
     assert missed.miss.remedies is not None
     freed = {each.names: each for each in missed.miss.remedies.enough}
     assert ("spring.pretension",) in freed

@@ -162,9 +162,7 @@ def test_a_contour_that_is_held_is_judged_by_the_same_limits() -> None:
 
 def test_a_corner_of_a_declared_edge_is_named_with_what_would_have_to_give() -> None:
     """The lever arm of this cam begins with a jump: a notch in which the roller touches two places."""
-    words = (
-        r"MinimumHollowRadius: cannot be kept.*radius of the hollow edge >= 6\.25 mm would have to give by"
-    )
+    words = r"\(MinimumHollowRadius\): cannot be kept.*the hollow edge >= 6\.25 mm would have to give by"
     with pytest.raises(InfeasibleError, match=words):
         design_cam(machine(), target=hill(54.0), free=["spring.pretension"], keep=[STRAIN], settings=QUICK)
 
@@ -174,7 +172,7 @@ def test_a_limit_on_a_radius_is_held_as_a_curvature_and_read_as_a_radius() -> No
     design = design_cam(machine(), target=hill(), free=CONTOUR, keep=keep, settings=QUICK)
     (state,) = (each for each in design.limits if each.limit == "MinimumRadiusOfCurvature")
     assert (state.upper, state.bound, state.active) == (False, pytest.approx(8e-3), True)
-    assert "radius of the convex edge 8 mm >= 8 mm  ACTIVE" in str(state)
+    assert "radius of the convex edge 8 mm >= 8 mm (MinimumRadiusOfCurvature)  ACTIVE" in str(state)
     rho = design.contour.radii_of_curvature
     assert rho[rho > 0.0].min() == pytest.approx(8e-3, rel=2e-3)
 
@@ -216,7 +214,7 @@ def test_a_jump_is_named_as_such() -> None:
     step = TabulatedTorque(angles=angles, torques=(0.0, 1.5, 2.0, 2.0))
     missed = design_cam(machine(), target=step, free=CONTOUR, keep=[STRAIN], settings=QUICK)
     assert missed.miss is not None
-    assert missed.miss.binding == ("MinimumHollowRadius",)
+    assert missed.miss.binding == ("radius of the hollow edge (MinimumHollowRadius)",)
     assert any("spread its jumps over 2° or more" in each for each in missed.miss.advice)
 
 

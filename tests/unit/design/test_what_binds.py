@@ -58,7 +58,7 @@ def missed() -> CamDesign:
 def test_convexity_is_a_limit_with_a_name_and_a_place(missed: CamDesign) -> None:
     """With the rubber given the closed form is the only contour, and it is hollow nearly all the way."""
     assert missed.miss is not None
-    assert missed.miss.binding == ("ConvexContour",)
+    assert missed.miss.binding == ("radius of curvature (ConvexContour)",)
     (state,) = (each for each in missed.limits if each.limit == "ConvexContour")
     assert state.where == "from 0° to 80°"
     (said,) = (each for each in missed.miss.advice if "hollow from" in each)
@@ -72,7 +72,7 @@ def test_convexity_is_a_limit_with_a_name_and_a_place(missed: CamDesign) -> None
 
 def test_a_contour_without_radius_is_printed_as_an_edge(missed: CamDesign) -> None:
     rows = dict(missed.rows())
-    assert rows["radius of curvature"] == "an edge from 0° to 80°, where ConvexContour binds"
+    assert rows["radius of curvature"] == "an edge from 0° to 80°, where convexity binds (ConvexContour)"
 
 
 def test_a_contour_that_bends_binds_nothing() -> None:

@@ -26,22 +26,24 @@ def question() -> LiveQuestion:
     ("sentence", "words"),
     [
         (
-            "limits MaximumStress, MinimumRadiusOfCurvature: contradict each other",
-            "limits largest nominal stress of the rubber (1.723 MPa), least radius of curvature (2.25 mm): "
+            "limits of stress of spring.rubber (MaximumStress), radius of curvature "
+            "(MinimumRadiusOfCurvature), first slope (PullingCable): contradict each other",
+            "limits of stress of spring.rubber (1.723 MPa), radius of curvature (2.25 mm), first slope: "
             "contradict each other",
         ),
         (
-            "MaximumStress: stress of spring.rubber <= 1.723 MPa would have to give by 0.5 MPa (to 2.2 MPa)",
+            "stress of spring.rubber <= 1.723 MPa would have to give by 0.5 MPa (to 2.2 MPa) (MaximumStress)",
             "stress of spring.rubber ≤ 1.723 MPa would have to give by 0.5 MPa (to 2.2 MPa)",
         ),
         (
-            "beyond what is declared: MinimumRadiusOfCurvature: radius of curvature 1 mm >= 2 mm",
+            "beyond what is declared: radius of curvature 1 mm >= 2 mm (MinimumRadiusOfCurvature)",
             "beyond what is declared: radius of curvature 1 mm ≥ 2 mm",
         ),
-        ("held by MaximumStrain", "held by largest strain of the rubber (166.7 %)"),
+        ("MaximumStrain: strain = -1", "largest strain of the rubber (166.7 %): strain = -1"),
         ("no MaximumCamRadius is asked for", "no largest cam radius is asked for"),
-        ("NumberRange: spring.rubber.area <= 60 mm²", "spring.rubber.area ≤ 60 mm²"),
-        ("ask for a longer one (RestLengthRange)", "ask for a longer one (its rest length)"),
+        ("no strength is asked for (PullingCable, NumberRange): any", "no strength is asked for: any"),
+        ("spring.rubber.area <= 60 mm² (NumberRange)", "spring.rubber.area ≤ 60 mm²"),
+        ("ask for a longer one (limit RestLengthRange)", "ask for a longer one"),
     ],
 )
 def test_a_limit_is_called_what_it_limits(question: LiveQuestion, sentence: str, words: str) -> None:

@@ -336,6 +336,9 @@ def test_traces_interpolate_grow_and_write(tmp_path: Path) -> None:
     more = run.with_signals({"c": np.ones(3)}, {"c": "m"})
     assert "c" in more
     assert "c" not in run
+    assert [*more] == [*more.keys()] == ["a.b", "c"]
+    assert {name: values[0] for name, values in more.items()} == {"a.b": 0.0, "c": 1.0}
+    assert dict(more)["c"].tolist() == [1.0, 1.0, 1.0]
     more.write_csv(tmp_path / "t.csv")
     with (tmp_path / "t.csv").open(newline="") as stream:
         rows = list(csv.reader(stream))
