@@ -85,11 +85,12 @@ def _si_unit(name: str, units: Mapping[str, str]) -> str:
     return unit
 
 
+@dataclass(frozen=True, eq=False)
 class _NamedSignals:
-    """What a mapping from name to signal has; its length is for each class to say."""
+    """What a mapping from name to signal has but a length, which a trace has in samples."""
 
+    time: Array
     signals: Mapping[str, Array]
-    name: str
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal."""
@@ -139,8 +140,6 @@ class Trace(_NamedSignals):
         If a signal has another number of samples than time.
     """
 
-    time: Array
-    signals: Mapping[str, Array]
     units: Mapping[str, str]
     name: str = ""
     warnings: tuple[RangeWarning, ...] = ()
