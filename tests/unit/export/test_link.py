@@ -178,7 +178,9 @@ def test_a_log_of_frames_is_read_as_a_table(source: CSource, board: Path, tmp_pa
         time.sleep(0.1)
         answers = ask(port, request(0, 0.2, 0.0), request(1, float("nan"), 0.0))
     log.write_bytes(b"noise" + answers[0] + answers[1][:9] + answers[1])
-    rows = list(csv.reader(play(source, "--log", log).stdout.splitlines()))
+    read = play(source, "--log", log)
+    assert f"{len(b'noise' + answers[1][:9])} bytes are in no whole frame" in read.stderr
+    rows = list(csv.reader(read.stdout.splitlines()))
     assert rows[0] == ["sequence", "status", "flags", *(v.name for v in source.model.outputs)]
     assert [row[0] for row in rows[1:]] == ["0", "1"]
     assert rows[1][2] == "clean"
