@@ -88,6 +88,7 @@ class MovingBody:
     # as a voltage or current: whatever is not known of them was not zero. A load from outside is none.
     commands: tuple[str, ...] = ()
     goals: tuple[str, ...] = ()  # names of the inputs that controllers in it follow
+    acting: tuple[str, ...] = ()  # names of the signals that are a command within the limits of its drive
 
     @property
     def acceleration(self) -> str:
@@ -255,10 +256,12 @@ def moving_bodies(assembly: Assembly, owners: Owners) -> tuple[MovingBody, ...]:
         drives = tuple(declared_by([name], owners.inputs))
         inertia = f"{name}.{'train_inertia' if name in geared else part.inertia_name}"
         motor = _motor(name, part, drives) if isinstance(part, GearedMotor | ElectricMotor) else None
-        commands, goals = _commands(assembly, (name, *geared.get(name, ())))
+        train = (name, *geared.get(name, ()))
+        commands, goals = _commands(assembly, train)
+        acting = tuple(f"{n}.{p.acting}" for n in train if isinstance(p := assembly[n], Free) and p.acting)
         bodies.append(
             MovingBody(
-                name, part.domain, motion, rate, inertia, drives, geared.get(name, ()), motor, commands, goals
+                name, part.domain, motion, rate, inertia, drives, train[1:], motor, commands, goals, acting
             )
         )
     return tuple(bodies)

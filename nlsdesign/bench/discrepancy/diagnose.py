@@ -39,7 +39,7 @@ from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
 from .screening.causality import lagging_forces, modes_too_quick
-from .screening.scale_and_sign import drive_findings, scale_findings
+from .screening.scale_and_sign import drive_findings, limit_findings, scale_findings
 from .screening.wrong_numbers import (
     far_numbers,
     is_explained_by_numbers,
@@ -54,7 +54,7 @@ from .selection.criteria import CALIBRATION, Criteria, is_complete
 from .selection.hypothesis import Hypothesis
 from .selection.measures import DECLARED, Excess, Excesses, Standing, standing_of
 from .selection.search import Outcome, search, with_what_has_no_name
-from .selection.trials import Step
+from .selection.trials import Step, without_twins
 from .tearing import blocks_of
 
 _CRITERIA = Criteria()
@@ -163,6 +163,7 @@ def _decided(
     findings = [
         *records.findings,
         *out_of_reach(case.actuator, records),
+        *limit_findings(flatten(case.actuator), records),
         *scale_findings(case.comparison, base),
     ]
     findings = findings or drive_findings(case.actuator, case.comparison, base)
@@ -247,6 +248,8 @@ def _decision(case: Case, base: Hypothesis, outcome: Outcome) -> _Decision:
 
 def _verdict(answer: _Answer, records: RecordSet) -> Verdict:
     case, base, outcome, decision = answer
+    bodies = flatten(case.actuator).bodies
+    outcome = replace(outcome, steps=tuple(without_twins(step, bodies) for step in outcome.steps))
     verdict = decision.verdict
     base = base.as_written()
     better = outcome.last if verdict == "named" or outcome.last.released else base

@@ -70,6 +70,8 @@ class Free(Body):
     """Field that says what is accelerated."""
     command: ClassVar[tuple[str, str]] = ("torque", "N*m")
     """Name and unit of what drives the body from outside."""
+    acting: ClassVar[str] = ""
+    """Name of the signal of what is left of the command within the limits of the drive; empty without one."""
 
     chain: tuple[tuple[str, DrivePart], ...] = ()
 

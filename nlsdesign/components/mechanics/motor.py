@@ -90,6 +90,7 @@ class CurrentDrivenMotor(ElectricMotor):
     """
 
     command: ClassVar[tuple[str, str]] = ("current", "A")
+    acting: ClassVar[str] = "winding_current"
 
     def drive(self, scope: Scope, motion: Motion) -> Expression:
         """Return k·I."""

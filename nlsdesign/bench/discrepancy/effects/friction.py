@@ -48,6 +48,8 @@ def tied(assembly: Assembly, name: str, body: str, element: Element) -> tuple[As
 
 _SHARE_OF_SLOWEST = 0.2
 """Width of the sign of friction, in the slowest speed that the records resolve: there the sign is 0.9999."""
+_LEAST_WIDTH = {"rad/s": 1e-6, "m/s": 1e-9}
+"""The least width that a law of friction takes: records in a wrong unit would ask for less."""
 
 
 def with_resolved_signs(before: Assembly, after: Assembly, slowest: Mapping[str, float]) -> Assembly:
@@ -64,7 +66,8 @@ def with_resolved_signs(before: Assembly, after: Assembly, slowest: Mapping[str,
         if name.endswith(".creep_speed") and id(width) not in declared and set(moving) <= slowest.keys():
             least = min((_SHARE_OF_SLOWEST * slowest[end] for end in moving), default=math.inf)
             if 0.0 < least < width.number:
-                widths[name] = number(significant([least])[0], width.unit)
+                least = max(significant([least])[0], _LEAST_WIDTH[width.unit])
+                widths[name] = number(least, width.unit)
     return after.with_values(widths) if widths else after
 
 

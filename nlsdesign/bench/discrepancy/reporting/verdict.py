@@ -48,7 +48,7 @@ HEADLINES: Mapping[str, str] = {
 EXPLANATIONS: Mapping[str, str] = {
     "none": "The refitted model explains the records down to their noise; nothing is missing.",
     "unknown": "Something is missing; what was tried and how far it goes is listed below.",
-    "undecidable": "Several effects explain these records equally well; the proposed record would tell.",
+    "undecidable": "An effect may be missing, but these records cannot tell which; see below what was tried.",
     "data_suspect": "The records are suspect, so nothing is named; look at the data first.",
 }
 _NOT_NAMED = "too little, or not surely enough, to be named under the criteria of this diagnosis"
@@ -273,7 +273,7 @@ class Verdict:
 
     def paragraphs(self) -> tuple[str, ...]:
         """Return the verdict in words: what was found, each effect, what is left."""
-        sentences = [] if self.verdict == "named" else [EXPLANATIONS[self.verdict]]
+        sentences = [] if self.verdict == "named" else [_explanation(self)]
         if let_go(self):
             sentences = [LET_GO[1]]
         sentences += [as_sentence(reason) for reason in suspicions(self)]
@@ -383,13 +383,20 @@ class Verdict:
         )
 
 
+def _explanation(verdict: Verdict) -> str:
+    """Return what a verdict without a name means; that a record would tell only where one is proposed."""
+    if verdict.verdict == "undecidable" and verdict.experiment is not None:
+        return "Several effects explain these records about as well; the proposed record would tell."
+    return EXPLANATIONS.get(verdict.verdict, "")
+
+
 def in_brief(verdict: Verdict) -> tuple[str, ...]:
     """Return the verdict in at most three sentences: what is missing, what that changes, what is next."""
     gap = verdict.gap()
     before, after = (three_digits(each) for each in gap.times)
     records = "held-out" if gap.role == "held_out" else "fitted"
     where = f"the error of `{gap.block}` on {records} records"
-    sentences = [LET_GO[1] if let_go(verdict) else EXPLANATIONS.get(verdict.verdict, "")]
+    sentences = [LET_GO[1] if let_go(verdict) else _explanation(verdict)]
     if verdict.verdict == "named":
         one = len(verdict.effects) == 1
         numbers = "; ".join(e.numbers_in_words() for e in verdict.effects if e.parameters)

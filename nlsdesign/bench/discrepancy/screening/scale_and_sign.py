@@ -9,6 +9,7 @@ others, such as a weight that the deck lacks, turns the sign of what a balance a
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
@@ -18,6 +19,7 @@ import numpy as np
 from ....components.assembly.named_parts import Assembly
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, MeasurementError
+from ....foundation.quantity import same_dimension
 from ....model import FlatModel, flatten
 from ....model.readings import ReadingNames, reading_of
 from ....model.structure import MovingBody, top_part
@@ -93,7 +95,8 @@ class Acting:
         """Return the measured signals that drive the body of a balance, and other measured efforts on it."""
         moving = {d.signal for d in block.drives.values() if d.order > 0}
         others = [s for s in dict.fromkeys(d.signal for d in block.drives.values()) if s not in moving]
-        own = {name for body in self._model.bodies if body.name == block.name for name in body.drives}
+        bodies = [body for body in self._model.bodies if body.name == block.name]
+        own = {name for body in bodies for name in (*body.drives, *body.acting)}
         drives = [s for s in others if reading_of(self._model.readings, s).measured in own]
         return drives, [s for s in others if s not in drives]
 
@@ -248,10 +251,30 @@ _USUAL_SHARE: Mapping[float, str] = {
     1e3: "is it in thousandths of the stated unit?",
     1e-3: "is it in thousands of the stated unit?",
 }
+_BEYOND_LIMIT, _OFTEN = 10.0, 0.9
+"""Times the declared limit of its drive that a current cannot be for the rest of this share of a record."""
 _NEAR = 5.0
 """Factor from one of these within which records make it suspect: the refit has bent numbers to meet them."""
 _LEFT = 0.02
 """Share of the mean square error that may be left with the factor undone."""
+
+
+def limit_findings(model: FlatModel, records: RecordSet) -> list[Finding]:
+    """Return the columns of currents that are far beyond what their drive is declared to allow."""
+    findings = []
+    for body in model.bodies:
+        name = body.motor.current_limit if body.motor else ""
+        limit, own = model.values.get(name, math.inf), {*body.commands, *body.acting}
+        for column in (c for c in records.columns if same_dimension(c.unit, "A")):
+            sizes = [float(np.quantile(np.abs(r.trace[column.signal]), _OFTEN)) for r in records.records]
+            drives = reading_of(model.readings, column.signal).measured in own
+            if drives and max(sizes) > _BEYOND_LIMIT * limit:
+                text = (
+                    f"is above {max(sizes):.3g} A for a tenth of a record, and {name} is declared as "
+                    f"{limit:.3g} A; is it in thousandths of the stated unit?"
+                )
+                findings.append(Finding(f"column '{column.name}'", text))
+    return findings
 
 
 def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis) -> list[Finding]:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from ....foundation.errors import ConvergenceError
 from ....foundation.work_sharing import parallel_map
+from ....model.structure import MovingBody
 from ..effects.effect import Candidate, EffectFunction
 from .comparison import Comparison
 from .criteria import Change, Criteria, Rival, choose, distance_to_next, imitates
@@ -43,6 +44,17 @@ class Step:
         """Identifiers of what predicts as well, with the place where that alone differs."""
         added = (each.newest for each in self.equals)
         return tuple(a.effect if a.effect != self.effect else f"{a.effect} at {a.location}" for a in added)
+
+
+def without_twins(step: Step, bodies: Iterable[MovingBody]) -> Step:
+    """Return a step without the same effect on what a rigid gear turns with its body: the same machine."""
+    leads = {name: body.name for body in bodies for name in (body.name, *body.geared)}
+
+    def named_at(hypothesis: Hypothesis) -> tuple[str, str]:
+        newest = hypothesis.newest
+        return newest.effect, leads.get(newest.location, newest.location)
+
+    return replace(step, equals=tuple(h for h in step.equals if named_at(h) != named_at(step.chosen)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -108,13 +108,16 @@ class Inputs:
 
     # commanded: full names of inputs, and of what a controller in the model commands its drive with
     commanded: frozenset[str] = frozenset()
-    shown: frozenset[str] = frozenset()  # full names of readings of one of them, for instance of a current
+    # shown: full names of readings of one of them, and of what is left of it within the limits of its drive
+    shown: frozenset[str] = frozenset()
 
     @staticmethod
     def of(model: FlatModel) -> Inputs:
         """Return what commands a model."""
         commanded = frozenset(v.name for v in model.inputs) | {c for b in model.bodies for c in b.commands}
-        return Inputs(commanded, frozenset(r.signal for r in model.readings if r.measured in commanded))
+        acting = frozenset(a for b in model.bodies for a in b.acting)
+        readings = (r.signal for r in model.readings if r.measured in commanded | acting)
+        return Inputs(commanded, frozenset(readings) | acting)
 
 
 @dataclass(frozen=True)

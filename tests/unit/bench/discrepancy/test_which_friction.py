@@ -87,6 +87,9 @@ def test_the_width_of_a_sign_is_a_fraction_of_the_slowest_speed_that_records_res
     (found,) = nls.effects.coulomb_friction(joint())
     width = "dry_friction.creep_speed"
     assert with_resolved_signs(joint(), found.assembly, {"motor": 0.005}).quantities()[width].number == 0.001
+    # Records in a wrong unit may ask for less than a law takes.
+    least = with_resolved_signs(joint(), found.assembly, {"motor": 1e-8}).quantities()[width]
+    assert least.number == 1e-6
     # Where the records resolve little, or nothing is known, the law keeps its own width.
     for slowest in ({"motor": 3.0}, {}):
         same = with_resolved_signs(joint(), found.assembly, slowest)
