@@ -85,11 +85,9 @@ def _si_unit(name: str, units: Mapping[str, str]) -> str:
     return unit
 
 
-@dataclass(frozen=True, eq=False)
 class _NamedSignals:
     """What a mapping from name to signal has but a length, which a trace has in samples."""
 
-    time: Array
     signals: Mapping[str, Array]
 
     def __getitem__(self, name: str) -> Array:
@@ -140,6 +138,9 @@ class Trace(_NamedSignals):
         If a signal has another number of samples than time.
     """
 
+    time: Array
+    # Frozen, so that here it can only be read.
+    signals: Mapping[str, Array]  # pyrefly: ignore[bad-override]
     units: Mapping[str, str]
     name: str = ""
     warnings: tuple[RangeWarning, ...] = ()
