@@ -15,9 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....components.assembly.named_parts import Assembly
-from ....components.mechanics.bodies import GearedMotor
-from ....components.mechanics.gear import Gear
+from ....components import Assembly, Gear, GearedMotor
 from ....foundation.errors import ConvergenceError, MeasurementError
 from ....foundation.quantity import parse_unit, same_dimension
 from ....model import flatten
