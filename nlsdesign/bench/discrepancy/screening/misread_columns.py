@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....components import Assembly, Gear, GearedMotor
+from ....components.assembly.named_parts import Assembly
 from ....foundation.errors import ConvergenceError, MeasurementError
 from ....foundation.quantity import parse_unit, same_dimension
 from ....model import flatten
@@ -23,7 +23,7 @@ from ...identification.equation_error.evidence import Bench
 from ...identification.records.mapping import Column
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
-from ..effects.places import laws
+from ..effects.places import gear_ratios
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
 from ..tearing import blocks_of
@@ -90,12 +90,10 @@ def _explained(actuator: Assembly, records: RecordSet, block: str, before: float
 
 def _readings(actuator: Assembly, records: RecordSet) -> Iterator[_Reading]:
     """Yield each other way to read one column or two."""
-    ratios = {p.ratio.number: path for path, p in laws(actuator) if isinstance(p, Gear)}
-    ratios |= {p.gear_ratio.number: path for path, p in laws(actuator) if isinstance(p, GearedMotor)}
     for column in records.columns:
         units = next((u for u in (("rad", "deg"), ("m", "mm")) if same_dimension(column.unit, u[0])), ())
         factors = {f"in {u}": parse_unit(u).factor / parse_unit(column.unit).factor for u in units}
-        for ratio, gear in ratios.items() if units else ():
+        for gear, ratio in gear_ratios(actuator) if units else ():
             factors[f"as the motion before the ratio of {gear}"] = 1.0 / ratio
             factors[f"as the motion behind the ratio of {gear}"] = ratio
         for words, factor in factors.items():

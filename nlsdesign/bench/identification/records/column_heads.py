@@ -27,7 +27,10 @@ _TIME_WORDS = (
     "tijd", "czas", "aika", "idő", "время", "时间", "時間",
 )  # fmt: skip
 """Further names of a time: of instruments, and in languages of benches."""
-_LOADS = ("load", "loads", "external", "ext", "outside", "applied", "disturbance", "contact", "hand", "last", "charge")
+_LOADS = frozenset({
+    "load", "loads", "external", "ext", "outside", "applied", "disturbance", "contact", "hand", "last",
+    "charge",
+})  # fmt: skip
 """Words in the head of a torque or force that acts from outside."""
 
 
@@ -138,11 +141,11 @@ def torque_in_doubt(name: str, signals: Sequence[str], model: FlatModel) -> str:
     drives = [command for body in model.bodies for command in body.commands]
     if name in signals or set(effort) <= set(drives) or not drives:
         return ""
-    if any(word.lower() in _LOADS for word in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)):
+    if not _LOADS.isdisjoint(piece.lower() for piece in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)):
         return ""
     return (
-        f", a load from outside, or what the motor gives: divide that by torque constant and gear ratio, give "
-        f"it the unit A and map it to '{drives[0]}'"
+        f", a load from outside, or what the motor gives: divide that by torque constant and gear ratio, "
+        f"give it the unit A and map it to '{drives[0]}'"
     )
 
 

@@ -614,7 +614,9 @@ def _with_counts_as_seen(chosen: ColumnMap, records: Sequence[Record]) -> tuple[
         count = min(r.resolution_of(column.signal).quantum for r in records)
         if count > _COARSER * column.quantum > 0.0:
             unit = parse_unit(column.unit)
-            seen, declared = (f"{without_power(each / unit.factor)} {column.unit}" for each in (count, column.quantum))
+            seen, declared = (
+                f"{without_power(each / unit.factor)} {column.unit}" for each in (count, column.quantum)
+            )
             text = f"moves in counts of {seen}, {declared} are declared: the former are used"
             remarks.append(Finding(f"column '{column.name}'", text))
             column = replace(column, quantum=count)

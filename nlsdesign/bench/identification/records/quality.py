@@ -1,7 +1,7 @@
 """Checks of measured tables before anything is fitted to them; each names file, column and rows.
 
-Samples that a sensor or a recorder got wrong are masked, see :mod:`~.faulty_samples`; jumps of a position, and
-channels that are constant or clipped, are findings. Findings make records suspect; remarks only say what was
+Samples that a sensor or a recorder got wrong are masked, see :mod:`~.faulty_samples`; jumps of a position
+and channels that are constant or clipped are findings. Findings make records suspect; remarks only say what was
 changed or what is unusual.
 """
 
@@ -179,7 +179,9 @@ def check_channels(file: str, time: Array, columns: Sequence[Sampled], *, first_
                 for each in others
             )
             rests = column.shows_input or (bool(others) and not any(moving))
-            (remarks if rests else findings).append(Finding(f"{place}, {rows}", f"is constant at {without_power(now[0], 6)}"))
+            (remarks if rests else findings).append(
+                Finding(f"{place}, {rows}", f"is constant at {without_power(now[0], 6)}")
+            )
         remarks += _too_coarse(place, column, now, time)
         for finding, suspect in _clipped(place, column, now, others, first_row):
             (findings if suspect else remarks).append(finding)
