@@ -1,8 +1,8 @@
 """Checks of measured tables before anything is fitted to them; each names file, column and rows.
 
 Samples that a sensor or a recorder got wrong are masked, see :mod:`~.faulty_samples`; jumps of a position
-and channels that are constant or clipped are findings. Findings make records suspect; remarks only say what was
-changed or what is unusual.
+and channels that are constant or clipped are findings. Findings make records suspect; remarks only say what
+was changed or what is unusual.
 """
 
 from __future__ import annotations
