@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import struct
 from pathlib import Path
 
@@ -95,6 +96,7 @@ RIGS = {
     "a text for a number": (_RIG.replace("0.0302", '"text"'), "kT_Nm_per_A: 'text' is no number"),
     "a table that is none": ("drivetrain = 5\n" + _RIG.replace("[drivetrain]", "[other]"), "is not a table"),
     "a number without end": (_RIG.replace("0.0302", "inf"), "is no number"),
+    "rubber without a length": (re.sub("L0_m = .*", "L0_m = 0", _RIG), "L0_m: 0 m is no length"),
 }  # fmt: skip
 
 
