@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 import struct
 from pathlib import Path
 
@@ -22,7 +21,7 @@ from nlsdesign.foundation.quantity import parse_unit
 from nlsdesign.foundation.text_files import text_of, write_text
 from tests.command_line import Run, run
 from tests.fuzz.commands import STUDIES
-from tests.fuzz.records import _RIG
+from tests.fuzz.records import _RIG, Records
 
 __all__ = ["run"]
 NUMBER = '[motor]\ncomponent = "Inertia"\ninertia = {{value = {}, unit = "{}", source = "x", spread = {}}}\n'
@@ -96,7 +95,6 @@ RIGS = {
     "a text for a number": (_RIG.replace("0.0302", '"text"'), "kT_Nm_per_A: 'text' is no number"),
     "a table that is none": ("drivetrain = 5\n" + _RIG.replace("[drivetrain]", "[other]"), "is not a table"),
     "a number without end": (_RIG.replace("0.0302", "inf"), "is no number"),
-    "rubber without a length": (re.sub("L0_m = .*", "L0_m = 0", _RIG), "L0_m: 0 m is no length"),
 }  # fmt: skip
 
 
@@ -105,6 +103,14 @@ def test_file_of_a_rig(name: str, tmp_path: Path) -> None:
     text, rule = RIGS[name]
     (tmp_path / "rig.toml").write_text(text, encoding="utf8")
     with pytest.raises(NlsError, match=rule):
+        bundled("models", "test_rig").test_rig_deck(tmp_path / "rig.toml", tmp_path / "cam.csv")
+
+
+def test_a_rig_whose_rubber_has_no_length(tmp_path: Path) -> None:
+    (case,) = (case for case in Records().undamaged() if case.how == "rig")
+    case.written(tmp_path)
+    write_text(tmp_path / "rig.toml", _RIG.replace("L0_m = 0.0125", "L0_m = 0"))
+    with pytest.raises(NlsError, match=r"rig\.toml: rubber\.L0_m: 0 m is no length"):
         bundled("models", "test_rig").test_rig_deck(tmp_path / "rig.toml", tmp_path / "cam.csv")
 
 
