@@ -12,7 +12,7 @@ samples and held from then on.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -39,6 +39,7 @@ NOT_STARTED = 1 << 11
 COMMAND_SLOWED = 1 << 12
 SAMPLE_LATE = 1 << 13
 SAMPLE_REPEATED = 1 << 14
+INNOVATION_LARGE = 1 << 15
 FIRST_INDEX_BIT, LAST_INDEX_BIT = 16, 30
 
 STATUS_BITS = {
@@ -75,6 +76,10 @@ STATUS_BITS = {
     ),
     "SAMPLE_LATE": (SAMPLE_LATE, "of step_at: samples are missing before this one"),
     "SAMPLE_REPEATED": (SAMPLE_REPEATED, "of step_at: the sample came twice; the last outputs were given"),
+    "INNOVATION_LARGE": (
+        INNOVATION_LARGE,
+        "readings have differed from what is expected by more than the deck explains; nothing was changed",
+    ),
 }
 
 
@@ -89,6 +94,10 @@ GAP = 3
 """Samples without a usable reading that are extrapolated, and from which on a model resumes from the next."""
 MOST = 1_000_000
 """Samples up to which gaps and rests are counted; a window of so many samples admits any reading."""
+
+
+OUTLIER = 9.0
+"""Times its limit that the square of an output counts at most in the mean of an alarm."""
 
 
 @dataclass(frozen=True)
@@ -207,6 +216,7 @@ class GuardedModel:
         self.begun = False
         self._inputs = [min(max(v.start, v.minimum), v.maximum) for v in model.inputs]
         self._outputs = first_outputs(model, self.real)
+        self._means = dict.fromkeys((v.name for v in model.outputs), 0.0)
         self._parameters = model.start(model.parameters)
         self._guards: dict[int, ReadingGuard] = {}
         for i, v in enumerate(model.inputs):
@@ -289,6 +299,19 @@ class GuardedModel:
             status |= STATE_RESTARTED
         if np.all(np.abs(outputs) <= self.real.largest):
             self._outputs = outputs.tolist()
+            at |= {v.name: y for v, y in zip(model.outputs, self._outputs, strict=True)}
+            status |= INNOVATION_LARGE if any([self._alarms(v, at) for v in model.outputs]) else 0
         else:
             status |= OUTPUT_HELD
         return list(self._outputs), status
+
+    def _alarms(self, variable: Variable, at: Mapping[str, float]) -> bool:
+        """Tell whether an output is larger than the deck explains, and go on with its mean."""
+        alarm, value = variable.alarm, at[variable.name]
+        if alarm is None or not alarm.window:
+            return alarm is not None and value > alarm.limit
+        over = 1.0 / (alarm.limit + sum(share * at[name] ** 2 for name, share in alarm.shares))
+        pace = (1.0 - alarm.limit * over) * float(self.model.sample_time or 0.0) / alarm.window
+        mean = self._means[variable.name]
+        self._means[variable.name] = mean + pace * (min(value**2 * over, OUTLIER) - mean)
+        return self._means[variable.name] > 1.0

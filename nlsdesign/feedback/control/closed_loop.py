@@ -70,7 +70,7 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
     inputs, waiting = wiring.inputs(), _waiting(wiring.driven, delay)
     states = (*observer.states, *controller.states, *waiting)
     parameters = (*observer.parameters, *wiring.controller_only())
-    outputs = (*observer.outputs, *controller.outputs)
+    outputs = (*wiring.outputs(), *controller.outputs)
     tables = (*observer.tables, *controller.tables)
     for group in ((*states, *inputs), parameters, outputs):
         once: set[str] = set()
@@ -128,6 +128,16 @@ class _Wiring:
                 did_you_mean=nearest(self.controller.inputs[0].name, list(given)),
             )  # fmt: skip
         return (*own, *wishes)
+
+    def outputs(self) -> tuple[Variable, ...]:
+        """Return the outputs of the observer; where an alarm looks at what acts, at the state that it is now."""
+        names = {self.driven.name: f"{self.driven.name}.{ACTING}"}
+        return tuple(
+            replace(v, alarm=replace(v.alarm, shares=tuple((names.get(n, n), s) for n, s in v.alarm.shares)))
+            if v.alarm is not None
+            else v
+            for v in self.observer.outputs
+        )
 
     def controller_only(self) -> tuple[Variable, ...]:
         """Return the parameters of the controller: those of the plant say that the observer keeps its own.
