@@ -17,7 +17,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_DECK "damper"
 #define SCHEDULED_DAMPER_DECK_DIGEST "1111111111111111111111111111111111111111111111111111111111111111"
 #define SCHEDULED_DAMPER_PARENT_DIGEST "0000000000000000000000000000000000000000000000000000000000000000"
-#define SCHEDULED_DAMPER_INTERFACE_VERSION 0xa012fa8bu /* another one where structures, functions or units differ */
+#define SCHEDULED_DAMPER_INTERFACE_VERSION 0xe8310680u /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
    set_parameters) as numbered below; bit 30 stands for all from 14 on: of these the refused parameters are those
@@ -37,6 +37,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_COMMAND_SLOWED 0x1000u /* a command changed faster than the drive can follow; what it can reach was used */
 #define SCHEDULED_DAMPER_SAMPLE_LATE 0x2000u /* of step_at: samples are missing before this one */
 #define SCHEDULED_DAMPER_SAMPLE_REPEATED 0x4000u /* of step_at: the sample came twice; the last outputs were given */
+#define SCHEDULED_DAMPER_INNOVATION_LARGE 0x8000u /* readings have differed from what is expected by more than the deck explains; nothing was changed */
 
 /* What step reads. */
 typedef struct {
@@ -89,6 +90,7 @@ typedef struct {
     scheduled_damper_inputs inputs; /* as they were taken */
     scheduled_damper_outputs outputs; /* last good */
     scheduled_damper_reading readings[1]; /* in the order of the inputs */
+    double means[1]; /* of squares over what the deck explains; an alarm above 1 */
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
     uint32_t started; /* SCHEDULED_DAMPER_INTERFACE_VERSION from init on; with any other number step gives NOT_STARTED */
 } scheduled_damper_state;
