@@ -1,9 +1,10 @@
 """False alarms of ``INNOVATION_LARGE`` and time to it: ``python -m benchmarks.innovation_bit``.
 
-Machines with numbers drawn from the spreads of the published deck, in C that shares nothing with the package
-(``default_machine.c``), are moved by currents as ``benchmarks.watch_motions`` draws them, a minute each; observers
-are those of the deck. Ten seconds after the start something goes wrong. The same again for a deck whose spreads are
-a tenth, as after a calibration, and machines drawn from these. Writes a table of ``docs/controller_code.md``.
+Machines with numbers drawn from the spreads of the published deck, in C that shares nothing with the
+package (``default_machine.c``), are moved by currents as ``benchmarks.watch_motions`` draws them, a minute
+each; observers are those of the deck. Ten seconds after the start something goes wrong. The same again for a
+deck whose spreads are a tenth, as after a calibration, and machines drawn from these. Writes a table of
+``docs/controller_code.md``.
 """
 
 from __future__ import annotations
@@ -67,7 +68,9 @@ SOFTER: Final = "spring 10 % softer, from the start"
 
 def with_spreads(model: FlatModel, share: float) -> FlatModel:
     """Return a machine whose numbers are known that much better."""
-    parameters = tuple(replace(v, spread=v.spread.narrowed(share)) if v.uncertain else v for v in model.parameters)
+    parameters = tuple(
+        replace(v, spread=v.spread.narrowed(share)) if v.uncertain else v for v in model.parameters
+    )
     return replace(model, parameters=parameters)
 
 
@@ -131,7 +134,7 @@ def rows(model: FlatModel, words: str, folder: Path) -> list[str]:
     lines = []
     for name, given in cases.items():
         begin = 0.0 if name in ("none", SOFTER) else BEGIN
-        late = TIMES >= begin
+        late = begin <= TIMES
         seen = {kind: [observed(step, *each) for each in given] for kind, step in steps.items()}
         cells = [times_to([s.bit & late for s in seen[kind]], begin) for kind in KINDS]
         cells.append(times_to([(s.innovation > most) & late for s in seen["cascade"]], begin))

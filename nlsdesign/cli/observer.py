@@ -303,7 +303,9 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
 
     def written(observer: FlatModel, *given: Any, **named: Any) -> object:
-        return export_c(observer if model is None else with_innovation_alarm(observer, model), *given, **named)
+        return export_c(
+            observer if model is None else with_innovation_alarm(observer, model), *given, **named
+        )
 
     result = verify(
         proved, untouched=untouched, model=model, deck=given,

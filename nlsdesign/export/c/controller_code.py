@@ -127,7 +127,9 @@ def header_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) ->
         "readings": [f"{c.name}_reading readings[{count}]; /* in the order of the inputs */"]
         if count
         else [],
-        "means": [f"{c.real} means[{len(c.means)}]; /* of squares over what the deck explains; an alarm above 1 */"]
+        "means": [
+            f"{c.real} means[{len(c.means)}]; /* of squares over what the deck explains; an alarm above 1 */"
+        ]
         if c.means
         else [],
         "derived": [f"{c.real} derived[{derived}]; /* follows from the parameters */"] if derived else [],

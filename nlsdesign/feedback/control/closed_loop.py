@@ -130,14 +130,14 @@ class _Wiring:
         return (*own, *wishes)
 
     def outputs(self) -> tuple[Variable, ...]:
-        """Return the outputs of the observer; where an alarm looks at what acts, at the state that it is now."""
-        names = {self.driven.name: f"{self.driven.name}.{ACTING}"}
-        return tuple(
-            replace(v, alarm=replace(v.alarm, shares=tuple((names.get(n, n), s) for n, s in v.alarm.shares)))
-            if v.alarm is not None
-            else v
-            for v in self.observer.outputs
-        )
+        """Return the outputs of the observer; alarms look at what acts, now a state."""
+        names, outputs = {self.driven.name: f"{self.driven.name}.{ACTING}"}, []
+        for v in self.observer.outputs:
+            if v.alarm is not None:
+                shares = tuple((names.get(name, name), share) for name, share in v.alarm.shares)
+                v = replace(v, alarm=replace(v.alarm, shares=shares))
+            outputs.append(v)
+        return tuple(outputs)
 
     def controller_only(self) -> tuple[Variable, ...]:
         """Return the parameters of the controller: those of the plant say that the observer keeps its own.

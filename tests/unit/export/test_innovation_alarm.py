@@ -41,7 +41,7 @@ def alarm_of(model: nls.FlatModel, name: str = ANGLE) -> Alarm:
 
 @pytest.mark.parametrize("real", ["float", "double"])
 def test_the_step_in_c_the_reference_and_the_formula_agree(real: str, tmp_path: Path) -> None:
-    """The mean of f² over the limit plus what state and input add, each at most nine; slow where they add little."""
+    """The mean of f² over what explains it, each at most nine, the slower the less motion adds."""
     alarm = Alarm(0.2, (("piston.filtered", 0.5), ("valve.opening", 0.25)), 2.0)
     model, draw = damper(), np.random.default_rng(5)
     model = replace(model, outputs=tuple(replace(v, alarm=alarm) for v in model.outputs))

@@ -32,8 +32,8 @@ SPREAD, INFLATION = "standard_deviation", "unrest"
 """Endings of names: the deviation that is expected of the estimate, and the factor on the noise."""
 
 UNEXPLAINED = 25.0
-"""Factor on the noise beyond which no number within the spreads explains the readings: residuals that stay five
-times as large as is expected. Of 100 drawn machines 99 stay below 2, and one reaches 12."""
+"""Factor on the noise beyond which no number within the spreads explains the readings: residuals that stay
+five times as large as is expected. Of 100 drawn machines 99 stay below 2, and one reaches 12."""
 
 
 class _Variables:

@@ -39,8 +39,8 @@ from ..scheduling.angle_form import PaperForm, StateForm
 from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observer_with_details, whole_contour
 from ..scheduling.step import CascadeGain, FittedGain, GainRule, SteadyStateKalman
 from ..scheduling.table import Grid
-from .innovation_alarm import with_innovation_alarm
 from .estimator_bound import SensedTorque, estimator_bound, rms_over
+from .innovation_alarm import with_innovation_alarm
 from .observer_bench import ObserverBench, observer_bench
 
 BEST, CORRECTED, CASCADE, CERTIFIED = "best", "corrected", "cascade", "certified"
@@ -127,13 +127,17 @@ def choose_observer(
         learned = expected_error(model, learning, duty)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
-        return ObserverOfChoice(with_alarm(cascade, model), f"cascade, for it cannot be corrected: {error}", ())
+        return ObserverOfChoice(
+            with_alarm(cascade, model), f"cascade, for it cannot be corrected: {error}", ()
+        )
     alone = learning.balance.before
     sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
     both = f"expected over the spread {sizes} of the cascade"
     if learned < alone:
         return ObserverOfChoice(learning, f"corrected: {both}", (alone, learned))
-    return ObserverOfChoice(with_alarm(cascade, model), f"cascade: the corrected one has {both}", (alone, learned))
+    return ObserverOfChoice(
+        with_alarm(cascade, model), f"cascade: the corrected one has {both}", (alone, learned)
+    )
 
 
 def expected_error(model: FlatModel, design: CorrectedDesign, duty: Duty | None) -> float:

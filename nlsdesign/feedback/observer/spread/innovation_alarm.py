@@ -1,14 +1,13 @@
 """How large the innovation of an observer may be if the machine is one of those that the deck describes.
 
-A machine whose numbers differ from the deck's accelerates otherwise by Σ cⱼ·φⱼ/J, with the terms φⱼ of its balance
-(:mod:`~nlsdesign.feedback.observer.corrected.balance`). The observer shows that as an innovation of at most G times
-as much, with G the largest gain from acceleration to innovation over frequency and angle. So the variance of the
-innovation is at most that of
+A machine whose numbers differ from the deck's accelerates otherwise by Σ cⱼ·φⱼ/J, with the terms φⱼ of its
+balance (:mod:`~nlsdesign.feedback.observer.corrected.balance`). The observer shows that as an innovation of at
+most G times as much, with G the largest gain from acceleration to innovation over frequency and angle. So the
+square of the innovation should stay below
 
-    q² + G²/J²·(σ_T²·T̂² + σ_D²·(D·i)² + friction's),
+    q² + 9·G²/J²·(σ_T²·T̂² + σ_D²·(D·i)² + friction's + that of an ammeter),
 
-with a count q, and with the deviations σ of what the spring and the drive give, as if these were independent. The
-alarm allows :data:`DEVIATIONS` times the root of what stands behind q².
+with a count q, and with the deviations σ of what spring and drive give, as if these were independent.
 """
 
 from __future__ import annotations
