@@ -97,6 +97,9 @@ def _show(description: RecordsDescription) -> None:
         show_table("Records", ("record", "rows", "used for"), named)
         for note in (*description.records.findings, *description.records.remarks):
             click.echo(f"{note.place}: {note.text}")
+    for column in description.columns:
+        if column.differs:
+            click.echo(f"column '{column.head}': {column.differs}")
     for column in description.undecided:
         click.echo(f"undecided: '{column.head}': {description.question(column)}")
     if description.problem:

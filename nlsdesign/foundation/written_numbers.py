@@ -9,6 +9,7 @@ import contextlib
 import math
 import re
 from collections.abc import Iterable
+from decimal import Decimal
 
 from .errors import UnitError
 from .quantity import parse_unit, typeset_unit
@@ -134,8 +135,8 @@ def without_power(value: float, digits: int = 3) -> str:
 
     Examples
     --------
-    >>> without_power(3987.0), without_power(0.01234), without_power(2.5e7, 2)
-    ('3990', '0.0123', '25000000')
+    >>> without_power(3987.0), without_power(0.01234), without_power(2.5e7, 2), without_power(-1.25e-5)
+    ('3990', '0.0123', '25000000', '-0.0000125')
     """
     text = f"{value:.{digits}g}"
-    return f"{float(text):.0f}" if "e+" in text else text
+    return f"{Decimal(text):f}" if "e" in text and abs(value) > 1e-7 else text

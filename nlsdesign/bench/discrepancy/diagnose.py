@@ -39,6 +39,7 @@ from .reporting.refit import Refit, sourced
 from .reporting.remainder import Remainder, remainder_of
 from .reporting.verdict import NamedEffect, Verdict, course_of, gaps_of, shapes_of
 from .screening.causality import lagging_forces, modes_too_quick
+from .screening.misread_columns import misread_findings
 from .screening.scale_and_sign import drive_findings, limit_findings, scale_findings
 from .screening.wrong_numbers import (
     far_numbers,
@@ -131,6 +132,12 @@ def diagnose(
         progress("judging by the noise of inputs that shows beside what was found")
         anew = _answer_anew(noisy, effects, progress)
         answer = answer if anew.leaves_something else anew
+    if answer.leaves_something:
+        progress("reading columns otherwise than is stated")
+        misread = misread_findings(actuator, chosen_by, answer.case.comparison, answer.base)
+        if misread:
+            decision = _Decision("data_suspect", tuple(str(f) for f in misread))
+            answer = answer._replace(outcome=Outcome(answer.base), decision=decision)
     progress("reading the held-out records")
     return _verdict(answer, records)
 

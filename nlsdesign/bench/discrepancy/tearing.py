@@ -335,11 +335,16 @@ def _what_to_measure(
 ) -> str:
     free = [body for body in model.bodies if not body.prescribed]
     led = {m.body.name for m in drives if m.body}
-    commands = [f"'{n}' (zeros where a winding is open)" for b in free if b.name in led for n in b.commands]
+    commands = [f"'{n}'" for b in free if b.name in led for n in b.commands]
     motions = [f"'{body.motion}' or '{body.rate}'" for body in free if body.name not in led]
     wanted = [each for each in commands if unknown] + motions
     example = wanted[0] if wanted else "an angle and a force"
-    return f"measure for instance {example}; measured are: {', '.join(signals)}"
+    both = (
+        "; of a motor that was on its log is needed, zeros are right only where its winding was open"
+        if example in commands
+        else ""
+    )
+    return f"measure for instance {example}{both}; measured are: {', '.join(signals)}"
 
 
 class _Cut(NamedTuple):

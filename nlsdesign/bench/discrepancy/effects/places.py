@@ -39,6 +39,15 @@ def laws(assembly: Assembly) -> Iterator[tuple[str, Part]]:
     return ((path, law(part)) for path, part in assembly.walk())
 
 
+def gear_ratios(assembly: Assembly) -> Iterator[tuple[str, float]]:
+    """Yield path and ratio of every gear and geared motor."""
+    for path, part in laws(assembly):
+        if isinstance(part, Gear):
+            yield path, part.ratio.number
+        elif isinstance(part, GearedMotor):
+            yield path, part.gear_ratio.number
+
+
 def _free(assembly: Assembly, domain: Domain) -> list[str]:
     return [n for n, p in assembly.parts if isinstance(p, Free) and p.domain == domain]
 

@@ -285,8 +285,8 @@ def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis)
         for factor, words in _USUAL_SHARE.items():
             if not all(1.0 / _NEAR < ratio / factor < _NEAR for ratio in ratios):
                 continue
-            left = _left_with(actuator, _divided(records, signal, factor), block)
-            before = _error_share(comparison, base, block)
+            left = _share_left(actuator, with_signals(records, {signal: (signal, 1.0 / factor)}), block)
+            before = error_share(comparison, base, block)
             if left is not None and left <= _LEFT * before:
                 share = 100.0 * (1.0 - left / before)
                 text = (
@@ -316,7 +316,7 @@ def _asked(comparison: Comparison, base: Hypothesis) -> dict[str, tuple[str, lis
     return asked
 
 
-def _error_share(comparison: Comparison, base: Hypothesis, block: str) -> float:
+def error_share(comparison: Comparison, base: Hypothesis, block: str) -> float:
     """Return the mean square error of a balance as a share of that of the effort of its drive."""
     acting, error, effort = Acting(comparison.bench, flatten(base.fitted)), 0.0, 0.0
     for judged in comparison.judged(base):
@@ -326,32 +326,27 @@ def _error_share(comparison: Comparison, base: Hypothesis, block: str) -> float:
     return error / max(effort, 1e-300)
 
 
-def _left_with(actuator: Assembly, records: RecordSet, block: str) -> float | None:
+def _share_left(actuator: Assembly, records: RecordSet, block: str) -> float | None:
     """Return the share of the effort that the refitted declared model leaves on other records."""
     try:
         bench = Bench(records, blocks_of(flatten(actuator), records.signals))
         comparison = Comparison(bench, typical_sizes(actuator, bench.records))
-        return _error_share(comparison, comparison.base(actuator), block)
+        return error_share(comparison, comparison.base(actuator), block)
     except (ConvergenceError, MeasurementError):
         return None  # then that is not what is wrong
 
 
-def _divided(records: RecordSet, signal: str, factor: float) -> RecordSet:
-    """Return the records with one signal divided by a factor."""
-    size = abs(factor)
+def with_signals(records: RecordSet, taken: Mapping[str, tuple[str, float]]) -> RecordSet:
+    """Return the records with each of some signals taken from another or from itself, times a factor."""
 
     def changed(record: Record) -> Record:
-        signals = {**record.trace.signals, signal: record.trace[signal] / factor}
+        signals = {to: factor * record.trace[source] for to, (source, factor) in taken.items()}
         sharp = {
-            name: each._replace(noise=each.noise / size, quantum=each.quantum / size)
-            if name == signal
-            else each
-            for name, each in record.resolution.items()
+            to: each._replace(noise=abs(factor) * each.noise, quantum=abs(factor) * each.quantum)
+            for to, (source, factor) in taken.items()
+            if (each := record.resolution.get(source))
         }
-        return replace(record, trace=replace(record.trace, signals=signals), resolution=sharp)
+        trace = replace(record.trace, signals={**record.trace.signals, **signals})
+        return replace(record, trace=trace, resolution={**record.resolution, **sharp})
 
-    columns = tuple(
-        replace(c, noise=c.noise / size, quantum=c.quantum / size) if c.signal == signal else c
-        for c in records.columns
-    )
-    return replace(records, records=tuple(map(changed, records.records)), columns=columns)
+    return replace(records, records=tuple(map(changed, records.records)))

@@ -33,6 +33,7 @@ import numpy as np
 
 from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError
+from ....foundation.written_numbers import without_power
 from ..filters import derivative
 from ..records.mapping import Column
 from ..records.measurement import Record, RecordSet
@@ -196,7 +197,7 @@ class _Likelihood(NamedTuple):
     def losses_of_others(self, form: Sampling) -> str:
         """Return in words how much less likely the other forms are than one of them."""
         others = (
-            f"{other.name} by {(self.loss(other) - self.loss(form)) / math.log(10.0):.3g}"
+            f"{other.name} by {without_power((self.loss(other) - self.loss(form)) / math.log(10.0))}"
             for other in _FORMS
             if other is not form
         )

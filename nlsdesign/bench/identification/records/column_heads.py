@@ -5,6 +5,7 @@ Columns of a file that drive a machine: its inputs over time, in SI.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -26,6 +27,11 @@ _TIME_WORDS = (
     "tijd", "czas", "aika", "idő", "время", "时间", "時間",
 )  # fmt: skip
 """Further names of a time: of instruments, and in languages of benches."""
+_LOADS = frozenset({
+    "load", "loads", "external", "ext", "outside", "applied", "disturbance", "contact", "hand", "last",
+    "charge",
+})  # fmt: skip
+"""Words in the head of a torque or force that acts from outside."""
 
 
 def times_among(heads: Sequence[str]) -> list[tuple[str, str]]:
@@ -96,11 +102,12 @@ def _signal(head: str, name: str, unit: str | None, model: FlatModel, file: str)
             next_step="write for instance 'force_N', or map it in records.toml",
         )
     fitting = signals_for(name, unit, model)
-    if len(fitting) == 1:
+    doubt = torque_in_doubt(name, fitting, model)
+    if len(fitting) == 1 and not doubt:
         return fitting[0]
     raise MeasurementError(
         f"{file}: column '{head}'",
-        f"could be {' or '.join(fitting)}"
+        f"could be {' or '.join(fitting)}{doubt}"
         if fitting
         else f"no sensor of the model reads in {typeset_unit(unit)}",
         next_step="write a records.toml that maps each column to its signal, see 'nlsdesign records'"
@@ -122,6 +129,24 @@ def signals_for(name: str, unit: str, model: FlatModel) -> tuple[str, ...]:
         if fitting:
             return tuple(fitting)
     return ()
+
+
+def torque_in_doubt(name: str, signals: Sequence[str], model: FlatModel) -> str:
+    """Return what else a column of torque or force may be that only fits a load; empty where it is a load.
+
+    ``name``: of the head, without its unit. Beside a drive most logs hold what the motor gives, no load.
+    """
+    inputs = {v.name: v.unit for v in model.inputs}
+    effort = [s for s in signals if any(same_dimension(inputs.get(s, "1"), unit) for unit in ("N*m", "N"))]
+    drives = [command for body in model.bodies for command in body.commands]
+    if name in signals or set(effort) <= set(drives) or not drives:
+        return ""
+    if not _LOADS.isdisjoint(piece.lower() for piece in re.findall(r"[A-Z]?[a-z]+|[A-Z]+", name)):
+        return ""
+    return (
+        f", a load from outside, or what the motor gives: divide that by torque constant and gear ratio, "
+        f"give it the unit A and map it to '{drives[0]}'"
+    )
 
 
 def _declared(model: FlatModel, signal: str) -> tuple[float, float]:

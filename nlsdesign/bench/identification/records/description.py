@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,21 +17,24 @@ from ....foundation.quantity import parse_unit, same_dimension
 from ....foundation.written_numbers import name_and_unit
 from ....model import FlatModel
 from ..residuals import noise_of, quantum_of
-from .column_heads import signals_for, times_among, times_without_unit
+from .column_heads import signals_for, times_among, times_without_unit, torque_in_doubt
 from .mapping import Inputs
 from .measurement import RecordSet, load_records
 from .quality import GAP
+from .sampling import FORMS
 from .table_files import RecordTable, read_table, table_files
 
 _LONGEST_STEP = 0.5
 """Samples further apart than this, in the numbers of a clock without unit, are taken for milliseconds."""
 
 _ROUNDING = 1e-12
+_NOISIER, _FARTHER = 3.0, 30.0
+"""Times the noise, and the size, of most files beyond which a file differs from them."""
 
 
 @dataclass(frozen=True)
 class DescribedColumn:
-    """One column, by its head, in the file that has the most of them."""
+    """One column, by its head, in all files that have it."""
 
     # head, unit: as in the file; the unit is empty where the head has none
     head: str
@@ -42,14 +46,16 @@ class DescribedColumn:
     clock: str
     clock_unit: str
     rate: float  # usual samples a second; nan without a clock
-    # noise, quantum: standard deviation of the white noise and smallest step between two values, in the unit
-    # of the file
+    # noise, quantum: standard deviation of the white noise, of the files in the middle, and smallest step
+    # between two values, in the unit of the file
     noise: float
     quantum: float
-    # smallest, largest: ends of its values, in the unit of the file
+    # smallest, largest: ends of its values in all files, in the unit of the file
     smallest: float
     largest: float
     drives: bool  # whether it is an input of the model, or the reading of one
+    doubt: str = ""  # what else it may be, beside the one signal in its unit
+    differs: str = ""  # in which file it is much larger or noisier than in most; empty where in none
 
 
 @dataclass(frozen=True)
@@ -96,9 +102,10 @@ class RecordsDescription:
         if column.clock and column.clock_unit != self.time_unit:
             own = f"its clock '{column.clock}' is in {column.clock_unit or 'no unit'}"
             return f"{own}, '{self.time}' is in {self.time_unit}: write both in one unit"
-        if len(column.signals) == 1 and [c.signals for c in self.columns].count(column.signals) == 1:
+        alone = len(column.signals) == 1 and [c.signals for c in self.columns].count(column.signals) == 1
+        if alone and not column.doubt:
             return ""
-        return " or ".join(column.signals) or "no sensor of the deck reads in its unit"
+        return " or ".join(column.signals) + column.doubt or "no sensor of the deck reads in its unit"
 
     def mapping(self) -> str:
         """Return a ``records.toml`` to begin with; what is not certain is a comment."""
@@ -130,8 +137,10 @@ class RecordsDescription:
             lines += [f"{mark}time = {_quoted(column.clock)}"]
             lines += [f"# needs resample_Hz = {_slowest(self.columns):.4g} at the top"] if question else []
         lines += [f"# noise = {column.noise:.3g}    # as estimated", f"# quantum = {column.quantum:.4g}"]
-        ways = '# between_samples = "held"    # "held", "held_before", "averaged" or "sampled"'
-        return [*lines, ways] if column.drives else lines
+        if column.drives:
+            lines += ["# How it runs between its samples; where no line is chosen, the records are asked:"]
+            lines += [f'# between_samples = "{form.name}"    # {form.words}' for form in FORMS]
+        return lines
 
 
 def _slowest(columns: Iterable[DescribedColumn]) -> float:
@@ -176,7 +185,7 @@ def describe_records(folder: Path, model: FlatModel, *, joint: str | None = None
     time, unit, guessed = _clock(whole)
     files = [_described(name, table, time, unit) for name, table in tables.items()]
     files += [DescribedFile(name, 0, np.nan, np.nan, 0, text) for name, text in problems.items()]
-    columns = tuple(_columns(whole, time, unit, model))
+    columns = tuple(_columns(whole, tables, time, unit, model))
     description = RecordsDescription(time, unit, guessed, tuple(sorted(files, key=lambda f: f.name)), columns)
     records, problem = _tried(Path(folder), model, description, joint)
     return RecordsDescription(time, unit, guessed, description.files, description.columns, records, problem)
@@ -209,7 +218,9 @@ def _described(name: str, table: RecordTable, time: str, unit: str) -> Described
     return DescribedFile(name, len(clock), float(clock[-1] - clock[0]), 1.0 / usual, gaps)
 
 
-def _columns(table: RecordTable, time: str, time_unit: str, model: FlatModel) -> list[DescribedColumn]:
+def _columns(
+    table: RecordTable, tables: Mapping[str, RecordTable], time: str, time_unit: str, model: FlatModel
+) -> list[DescribedColumn]:
     """Return the columns that are no clocks; each belongs to the last clock before it of its own length."""
     given = Inputs.of(model)
     inputs = given.commanded | given.shown
@@ -219,27 +230,56 @@ def _columns(table: RecordTable, time: str, time_unit: str, model: FlatModel) ->
         if head in clocks or head == time:
             continue
         values = table.given[head]
+        over = {name: each.given[head] for name, each in tables.items() if len(each.given.get(head, ()))}
         name, unit = name_and_unit(head)
         unit = unit or table.units.get(head, "")
         same = [c for c in clocks if c in table.given and len(table.given[c]) == len(values)]
         before = [c for c in same if table.heads.index(c) < place] or same or [time]
-        smallest, largest = (float(f(values)) if len(values) else np.nan for f in (np.min, np.max))
         signals = signals_for(name, unit, model) if unit else ()
         own = before[-1]
         clock_unit = time_unit if own == time else name_and_unit(own)[1] or table.units.get(own) or ""
         step = np.median(np.diff(table.given[own])) if own in table.given else 0.0
-        drives = any(signal in inputs for signal in signals)
-        # Rounding of sums is no noise.
-        noise = noise_of(values) if noise_of(values) > _ROUNDING * (largest - smallest) else 0.0
         result.append(
             DescribedColumn(
                 head=head, unit=unit, signals=signals, clock="" if own == time else own,
                 clock_unit=clock_unit,
                 rate=float(1.0 / (step * parse_unit(clock_unit).factor)) if step > 0.0 else np.nan,
-                noise=noise, quantum=quantum_of(values), smallest=smallest, largest=largest, drives=drives,
+                drives=any(signal in inputs for signal in signals),
+                doubt=torque_in_doubt(name, signals, model), **_over_files(over)._asdict(),
             )
         )  # fmt: skip
     return result
+
+
+class _OverFiles(NamedTuple):
+    """Numbers of one column over all files, as :class:`DescribedColumn` has them."""
+
+    noise: float
+    quantum: float
+    smallest: float
+    largest: float
+    differs: str
+
+
+def _over_files(values: Mapping[str, Array]) -> _OverFiles:
+    """Return the numbers of a column, and in which file they are far from those of most."""
+    if not values:
+        return _OverFiles(np.nan, 0.0, np.nan, np.nan, "")
+    sizes = {file: float(np.max(np.abs(column))) for file, column in values.items()}
+    # Rounding of sums is no noise.
+    noises = {f: n if (n := noise_of(v)) > _ROUNDING * np.ptp(v) else 0.0 for f, v in values.items()}
+    noise, size = (float(np.median(list(group.values()))) for group in (noises, sizes))
+    quantum = min((q for q in map(quantum_of, values.values()) if q), default=0.0)
+    noisy = max(noises, key=noises.__getitem__)
+    far = max(sizes, key=lambda file: max(sizes[file], size) / max(min(sizes[file], size), 1e-300))
+    differs = []
+    if noises[noisy] > _NOISIER * max(noise, quantum):
+        differs.append(f"its noise is {noises[noisy]:.3g} in {noisy}, {noise:.3g} in most files")
+    low, high = sorted((sizes[far], size))
+    if high > _FARTHER * low:
+        differs.append(f"it goes to {sizes[far]:.3g} in {far}, to {size:.3g} in most files")
+    smallest, largest = (float(f([f(v) for v in values.values()])) for f in (np.min, np.max))
+    return _OverFiles(noise, quantum, smallest, largest, "; ".join(differs))
 
 
 def _is_clock(head: str, table: RecordTable) -> bool:

@@ -123,7 +123,8 @@ def _sampled(column: Column, values: Array, mapping: ColumnMap) -> Sampled:
     motion = any(same_dimension(column.unit, unit) for unit in ("rad", "m"))
     commanded = column.signal in mapping.inputs.commanded
     shown = commanded or column.signal in mapping.inputs.shown
-    return Sampled(column.name, column.unit, values, commanded, shown, motion)
+    count = column.quantum / parse_unit(column.unit).factor
+    return Sampled(column.name, column.unit, values, commanded, shown, motion, count)
 
 
 def _seconds(table: RecordTable, clock: Column) -> Array:

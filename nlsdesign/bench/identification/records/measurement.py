@@ -22,6 +22,7 @@ from ....foundation.arrays import Array, Mask
 from ....foundation.csv_tables import heads_with_units
 from ....foundation.errors import MeasurementError, nearest, unknown_name, visible
 from ....foundation.quantity import parse_unit
+from ....foundation.written_numbers import without_power
 from ....model import FlatModel
 from ....simulation import Trace
 from ..filters import blurred, derivative
@@ -613,7 +614,9 @@ def _with_counts_as_seen(chosen: ColumnMap, records: Sequence[Record]) -> tuple[
         count = min(r.resolution_of(column.signal).quantum for r in records)
         if count > _COARSER * column.quantum > 0.0:
             unit = parse_unit(column.unit)
-            seen, declared = (f"{each / unit.factor:.3g} {column.unit}" for each in (count, column.quantum))
+            seen, declared = (
+                f"{without_power(each / unit.factor)} {column.unit}" for each in (count, column.quantum)
+            )
             text = f"moves in counts of {seen}, {declared} are declared: the former are used"
             remarks.append(Finding(f"column '{column.name}'", text))
             column = replace(column, quantum=count)

@@ -149,6 +149,13 @@ class RecordTable:
 
     def of_joint(self, joint: str) -> RecordTable:
         """Return the columns of a joint, whose name stands between slashes in a head, with their clocks."""
+        if not self.behind:
+            raise MeasurementError(
+                f"{self.file}: joint '{joint}'",
+                "is asked of a table; heads name joints in logs of messages only",
+                next_step="write a records.toml that maps the columns of this joint ('nlsdesign records "
+                "describe FOLDER --deck DECK', without --joint)",
+            )
         of = [head for head in self.given if of_joint(head, joint) and head not in self.behind]
         if not of:
             parts = {part for head in self.given for part in head.split("/")[1:] if head not in self.behind}

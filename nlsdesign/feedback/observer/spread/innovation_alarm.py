@@ -1,8 +1,8 @@
 """How large the innovation of an observer may be if the machine is one of those that the deck describes.
 
 A machine whose numbers differ from the deck's accelerates otherwise by Σ cⱼ·φⱼ/J, with the terms φⱼ of its
-balance (:mod:`~nlsdesign.feedback.observer.corrected.balance`). The observer shows that as an innovation of at
-most G times as much, with G the largest gain from acceleration to innovation over frequency and angle. So the
+balance (:mod:`~nlsdesign.feedback.observer.corrected.balance`). The observer shows that as an innovation of
+at most G times as much, with G the largest gain from acceleration to innovation over frequency and angle. So the
 square of the innovation should stay below
 
     q² + 9·G²/J²·(σ_T²·T̂² + σ_D²·(D·i)² + friction's + that of an ammeter),

@@ -261,7 +261,7 @@ def test_the_error_of_a_balance_stands_beside_the_torque_of_the_drive() -> None:
 
 
 def test_a_balance_without_its_drive_is_refused_with_what_to_measure() -> None:
-    with pytest.raises(MeasurementError, match=r"'motor\.current' \(zeros where a winding is open\)"):
+    with pytest.raises(MeasurementError, match=r"'motor\.current'; of a motor that was on its log is needed"):
         driven_wheel(with_current=False)
 
 

@@ -171,7 +171,7 @@ def test_every_subset_gives_blocks_that_vanish_on_the_model_itself(
 @pytest.mark.parametrize(
     ("machine", "signals", "advice"),
     [
-        ("series", ("motor.angle",), "'motor.current' (zeros where a winding is open)"),
+        ("series", ("motor.angle",), "'motor.current'; of a motor that was on its log is needed"),
         ("series", ("arm.angle",), "'motor.angle' or 'motor.speed'"),
         ("series", ("motor.acceleration",), "measure for instance 'motor.angle' or 'motor.speed'"),
         ("servo", ("servo.angle",), "'servo.wanted_voltage'"),

@@ -10,6 +10,8 @@ import pytest
 from nlsdesign.bench.identification import load_records
 from nlsdesign.bench.identification.records.description import describe_records
 from nlsdesign.components import Encoder, TorqueSensor
+from nlsdesign.components.assembly.deck_template import load_template
+from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import FlatModel, flatten
 from tests.unit.bench.identification.test_measurement import STEP, model, table, wheel, write
@@ -124,3 +126,41 @@ def test_a_file_that_cannot_be_read_is_told_beside_the_others(tmp_path: Path, mo
     assert "it is no text" in bad.problem
     with pytest.raises(MeasurementError, match="there is no such folder"):
         describe_records(tmp_path / "nowhere", model)
+
+
+@pytest.fixture(scope="module")
+def joint() -> FlatModel:
+    return flatten(declare(load_template("geared-joint").deck))
+
+
+def test_numbers_of_a_column_are_those_of_all_files(tmp_path: Path, joint: FlatModel) -> None:
+    """The second file is larger and the third much noisier than the first."""
+    time, draws = 0.002 * np.arange(600), np.random.default_rng(5).standard_normal((3, 600))
+    for number, (size, noise) in enumerate(((1.0, 0.01), (4.0, 0.01), (2.0, 0.5))):
+        rows = np.column_stack([time, size * np.sin(6.0 * time) + noise * draws[number], np.sin(6.0 * time)])
+        head = "t_s,current_A,angle_rad"
+        np.savetxt(tmp_path / f"run{number}.csv", rows, "%.6f", ",", header=head, comments="")
+    described = describe_records(tmp_path, joint)
+    current = next(c for c in described.columns if c.head == "current_A")
+    assert current.largest > 3.9
+    assert current.noise == pytest.approx(0.01, rel=0.2)
+    assert "run2" in current.differs
+    assert "its noise is" in current.differs
+    mapping = described.mapping()
+    assert mapping.count("# between_samples = ") == 4
+    assert "holds each value from its stamp to the next" in mapping
+
+
+def test_a_torque_beside_a_drive_may_be_that_of_the_motor(tmp_path: Path, joint: FlatModel) -> None:
+    rows = np.column_stack([0.002 * np.arange(300), np.sin(0.02 * np.arange(300)), np.cos(np.arange(300))])
+    for head in ("motor_torque_Nm", "tau_Nm"):
+        np.savetxt(tmp_path / "a.csv", rows, "%.6f", ",", header=f"t_s,angle_rad,{head}", comments="")
+        described = describe_records(tmp_path, joint)
+        column = next(c for c in described.columns if c.head == head)
+        assert "divide that by torque constant and gear ratio" in described.question(column)
+
+
+def test_a_joint_is_no_part_of_a_table(tmp_path: Path, joint: FlatModel) -> None:
+    (tmp_path / "a.csv").write_text("t_s,angle_rad\n" + "".join(f"{0.01 * k},{k}\n" for k in range(50)))
+    with pytest.raises(MeasurementError, match=r"is asked of a table; heads name joints in logs of messages"):
+        load_records(tmp_path, joint, joint="elbow")

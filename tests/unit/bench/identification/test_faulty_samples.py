@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from nlsdesign.bench.identification.records.quality import (
+from nlsdesign.bench.identification.records.faulty_samples import (
     LONGEST,
     Surroundings,
     Witness,
