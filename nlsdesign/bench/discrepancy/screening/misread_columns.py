@@ -16,21 +16,17 @@ from typing import NamedTuple
 import numpy as np
 
 from ....components.assembly.named_parts import Assembly
-from ....foundation.errors import ConvergenceError, MeasurementError
 from ....foundation.quantity import parse_unit, same_dimension
-from ....model import flatten
-from ...identification.equation_error.evidence import Bench
 from ...identification.records.mapping import Column
 from ...identification.records.measurement import RecordSet
 from ...identification.records.quality import Finding
 from ..effects.places import gear_ratios
 from ..selection.comparison import Comparison
 from ..selection.hypothesis import Hypothesis
-from ..tearing import blocks_of
-from .scale_and_sign import error_share, typical_sizes, with_signals
+from .scale_and_sign import error_share, refitted, with_signals
 
 _LITTLE, _NOISE = 0.05, 1.5
-"""Share of the error that may be left besides, and mean squares of the noise that count as nothing left."""
+"""Share of error and effort that may be left besides; mean squares of noise that count as nothing left."""
 
 
 class _Reading(NamedTuple):
@@ -51,13 +47,12 @@ def misread_findings(
     worst = max(comparison.judged(base), key=lambda judged: float(judged.residual @ judged.residual))
     block = worst.block.name
     before = error_share(comparison, base, block)
-    # What one record denies need not be asked of all.
-    one = replace(records, records=tuple(r for r in records.records if r.name == worst.record.name))
     shares: dict[tuple[str, str], float] = {}
-    for reading, everywhere in zip(_readings(actuator, one), _readings(actuator, records), strict=True):
-        left = _explained(actuator, reading.records, block, before)
-        if left is not None:
-            left = _explained(actuator, everywhere.records, block, before)
+    for reading in _readings(actuator, records):
+        # What one record denies need not be asked of all.
+        one = tuple(r for r in reading.records.records if r.name == worst.record.name)
+        first = _explained(actuator, replace(reading.records, records=one), block, before)
+        left = None if first is None else _explained(actuator, reading.records, block, before)
         if left is not None:
             shares[reading.column, reading.words] = left
     if not shares:
@@ -76,34 +71,32 @@ def _explained(actuator: Assembly, records: RecordSet, block: str, before: float
 
     Little is left where it is less than a few per cent of all, or where what is left is the filtered noise.
     """
-    try:
-        bench = Bench(records, blocks_of(flatten(actuator), records.signals))
-        comparison = Comparison(bench, typical_sizes(actuator, bench.records))
-        base = comparison.base(actuator)
-    except (ConvergenceError, MeasurementError):
-        return None  # then that is not what is wrong
-    squares = [float(np.mean(j.residual**2)) for j in comparison.judged(base) if j.block.name == block]
+    if (anew := refitted(actuator, records)) is None:
+        return None
+    comparison, base = anew
     left = error_share(comparison, base, block)
+    squares = [float(np.mean(j.residual**2)) for j in comparison.judged(base) if j.block.name == block]
     little = left <= _LITTLE * min(before, 1.0) or (left < before and max(squares) < _NOISE)
     return left if little else None
 
 
 def _readings(actuator: Assembly, records: RecordSet) -> Iterator[_Reading]:
     """Yield each other way to read one column or two."""
+    ways = list[tuple[str, str, dict[str, tuple[str, float]]]]()
     for column in records.columns:
         units = next((u for u in (("rad", "deg"), ("m", "mm")) if same_dimension(column.unit, u[0])), ())
         factors = {f"in {u}": parse_unit(u).factor / parse_unit(column.unit).factor for u in units}
         for gear, ratio in gear_ratios(actuator) if units else ():
             factors[f"as the motion before the ratio of {gear}"] = 1.0 / ratio
             factors[f"as the motion behind the ratio of {gear}"] = ratio
-        for words, factor in factors.items():
-            if factor != 1.0:
-                scaled = with_signals(records, {column.signal: (column.signal, factor)})
-                yield _Reading(column.name, words, scaled)
+        others = {words: factor for words, factor in factors.items() if factor != 1.0}
+        ways += [(column.name, words, {column.signal: (column.signal, f)}) for words, f in others.items()]
     for one, other in combinations(records.columns, 2):
         factor = parse_unit(one.unit).factor / parse_unit(other.unit).factor
-        taken = {one.signal: (other.signal, factor), other.signal: (one.signal, 1.0 / factor)}
-        yield _Reading(one.name, f"exchanged with '{other.name}'", with_signals(records, taken))
+        exchanged = {one.signal: (other.signal, factor), other.signal: (one.signal, 1.0 / factor)}
+        ways.append((one.name, f"exchanged with '{other.name}'", exchanged))
+    for name, words, taken in ways:
+        yield _Reading(name, words, with_signals(records, taken))
     for column in records.columns:
         if column.declared and column.sampling and column.sampling.late:
             words = "as the records show that it runs between its samples"

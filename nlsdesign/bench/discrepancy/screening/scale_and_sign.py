@@ -285,9 +285,9 @@ def drive_findings(actuator: Assembly, comparison: Comparison, base: Hypothesis)
         for factor, words in _USUAL_SHARE.items():
             if not all(1.0 / _NEAR < ratio / factor < _NEAR for ratio in ratios):
                 continue
-            left = _share_left(actuator, with_signals(records, {signal: (signal, 1.0 / factor)}), block)
+            undone = refitted(actuator, with_signals(records, {signal: (signal, 1.0 / factor)}))
             before = error_share(comparison, base, block)
-            if left is not None and left <= _LEFT * before:
+            if undone and (left := error_share(*undone, block)) <= _LEFT * before:
                 share = 100.0 * (1.0 - left / before)
                 text = (
                     f"is {_range(ratios)} times what '{block}' asks of the drive; with that undone the "
@@ -326,12 +326,12 @@ def error_share(comparison: Comparison, base: Hypothesis, block: str) -> float:
     return error / max(effort, 1e-300)
 
 
-def _share_left(actuator: Assembly, records: RecordSet, block: str) -> float | None:
-    """Return the share of the effort that the refitted declared model leaves on other records."""
+def refitted(actuator: Assembly, records: RecordSet) -> tuple[Comparison, Hypothesis] | None:
+    """Return the declared model refitted to records that are read otherwise; None where it cannot be."""
     try:
         bench = Bench(records, blocks_of(flatten(actuator), records.signals))
         comparison = Comparison(bench, typical_sizes(actuator, bench.records))
-        return error_share(comparison, comparison.base(actuator), block)
+        return comparison, comparison.base(actuator)
     except (ConvergenceError, MeasurementError):
         return None  # then that is not what is wrong
 
