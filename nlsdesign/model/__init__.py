@@ -1,6 +1,6 @@
 """From an assembly to a frozen, flat, named model, and views of it."""
 
-from .flat import Alarm, FlatModel, Plausibility, Table, Variable, casadi_dae
+from .flat import FlatModel, Plausibility, Table, Variable, casadi_dae
 from .flatten import flatten
 from .origin import Origin
 from .roles import measured_motion as measured_motion
@@ -8,7 +8,6 @@ from .roles import series_spring as series_spring
 from .transform import with_outputs as with_outputs
 
 __all__ = [
-    "Alarm",
     "FlatModel",
     "Origin",
     "Plausibility",

@@ -65,38 +65,6 @@ class Plausibility:
 
 
 @dataclass(frozen=True)
-class Alarm:
-    """When an output of a sampled model says that the machine is not the declared one.
-
-    With a window the mean of the squared output over ``limit`` plus the ``shares`` is judged, else the output
-    itself over the limit. A mean goes on as far as the shares exceed the limit: at rest it stands.
-
-    Parameters
-    ----------
-    limit
-        What may be without any motion: its square with a window, else the output itself.
-    shares
-        What the square of an output, state or input, by name, adds to the limit per square of its unit.
-    window
-        Time constant of the mean in s; zero for no mean.
-
-    Raises
-    ------
-    ValueRangeError
-        If the limit is not positive and finite, or another number is negative.
-    """
-
-    limit: float
-    shares: tuple[tuple[str, float], ...] = ()
-    window: float = 0.0
-
-    def __post_init__(self) -> None:
-        others = (self.window, *(share for _, share in self.shares))
-        if not (0.0 < self.limit < math.inf and all(0.0 <= v < math.inf for v in others)):
-            raise ValueRangeError(f"{self}", "needs a positive limit, and no number that is negative")
-
-
-@dataclass(frozen=True)
 class Variable:
     """A named number of the model: state, input, parameter, output or signal. All in SI.
 
@@ -117,11 +85,10 @@ class Variable:
     source, spread
         Where a parameter's number comes from, and how far the true one may lie from it.
     plausibility
-        Of a measured input: what a reading can be; ``None`` for a command.
+        Of a measured input: what a reading can be; ``None`` for a command. Of an output of a sampled model:
+        the deck does not explain one above ``maximum``, and the status word says so (``INNOVATION_LARGE``).
     largest_rate
         Of a command: how fast it is followed at most, in its unit per second.
-    alarm
-        Of an output of a sampled model: when the status word says that it is larger than the deck explains.
     """
 
     name: str
@@ -135,7 +102,6 @@ class Variable:
     spread: Spread = EXACT
     plausibility: Plausibility | None = None
     largest_rate: float = float("inf")
-    alarm: Alarm | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "spread", as_spread(self.spread))

@@ -17,7 +17,7 @@ from nlsdesign.export.c.writer import CWriter
 from nlsdesign.export.fmi.fmu import fmu_texts
 from nlsdesign.foundation.deck import ParentDeck
 from nlsdesign.foundation.quantity import quantity
-from nlsdesign.model import Alarm, Plausibility
+from nlsdesign.model import Plausibility
 from nlsdesign.model.flat import FlatModel, Table, Variable
 from nlsdesign.model.origin import Origin
 from tests.hand_built import plant
@@ -40,7 +40,6 @@ def damper() -> FlatModel:
     table = Table(
         "piston.speed", -1.0, 1.0, (Variable("viscosity", "N*s/m", "Viscosity"),), np.array([[3.0], [2], [4]])
     )
-    alarm = Alarm(2.0, (("piston.filtered", 0.5), ("valve.opening", 0.25)), 2.0)
     gain = quantity(0.75, "N*s/m", source="bench 2024-05-01", spread=0.1)
     return FlatModel(
         "scheduled damper",
@@ -55,7 +54,7 @@ def damper() -> FlatModel:
                 "memory.gain", "N*s/m", "Weight of the past", 0.75, 1.0, 0.0, 10.0, "bench 2024-05-01", 0.1
             ),
         ),
-        (Variable("piston.force", "N", "Force", alarm=alarm),),
+        (Variable("piston.force", "N", "Force", maximum=3.0, plausibility=Plausibility()),),
         (Variable("force.squared", "N^2", "Square of the force"),),
         equations,
         0.01,

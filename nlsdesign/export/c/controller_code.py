@@ -127,11 +127,6 @@ def header_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) ->
         "readings": [f"{c.name}_reading readings[{count}]; /* in the order of the inputs */"]
         if count
         else [],
-        "means": [
-            f"{c.real} means[{len(c.means)}]; /* of squares over what the deck explains; an alarm above 1 */"
-        ]
-        if c.means
-        else [],
         "derived": [f"{c.real} derived[{derived}]; /* follows from the parameters */"] if derived else [],
         **_heads(c.name),
         **blocks,
@@ -178,7 +173,6 @@ def source_text(c: CWriter, blocks: Mapping[str, list[str]] = WITHOUT_BLOCKS) ->
                 f"state->readings[{reading.number}].last = start_inputs.{path};",
             )
         ],
-        "start_means": [f"state->means[{i}] = {real.literal(0.0)};" for i in range(len(c.means))],
         "settled": settled,
         "take": take_statements(c),
         "period": str(max(2, round(1e6 * float(model.sample_time or 0.0)))),

@@ -12,7 +12,7 @@ samples and held from then on.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -94,10 +94,6 @@ GAP = 3
 """Samples without a usable reading that are extrapolated, and from which on a model resumes from the next."""
 MOST = 1_000_000
 """Samples up to which gaps and rests are counted; a window of so many samples admits any reading."""
-
-
-OUTLIER = 9.0
-"""Times its limit that the square of an output counts at most in the mean of an alarm."""
 
 
 @dataclass(frozen=True)
@@ -216,7 +212,6 @@ class GuardedModel:
         self.begun = False
         self._inputs = [min(max(v.start, v.minimum), v.maximum) for v in model.inputs]
         self._outputs = first_outputs(model, self.real)
-        self._means = dict.fromkeys((v.name for v in model.outputs), 0.0)
         self._parameters = model.start(model.parameters)
         self._guards: dict[int, ReadingGuard] = {}
         for i, v in enumerate(model.inputs):
@@ -299,19 +294,8 @@ class GuardedModel:
             status |= STATE_RESTARTED
         if np.all(np.abs(outputs) <= self.real.largest):
             self._outputs = outputs.tolist()
-            at |= {v.name: y for v, y in zip(model.outputs, self._outputs, strict=True)}
-            status |= INNOVATION_LARGE if any([self._alarms(v, at) for v in model.outputs]) else 0
+            judged = [(y, v) for y, v in zip(self._outputs, model.outputs, strict=True) if v.plausibility]
+            status |= INNOVATION_LARGE if any(y > v.maximum for y, v in judged) else 0
         else:
             status |= OUTPUT_HELD
         return list(self._outputs), status
-
-    def _alarms(self, variable: Variable, at: Mapping[str, float]) -> bool:
-        """Tell whether an output is larger than the deck explains, and go on with its mean."""
-        alarm, value = variable.alarm, at[variable.name]
-        if alarm is None or not alarm.window:
-            return alarm is not None and value > alarm.limit
-        over = 1.0 / (alarm.limit + sum(share * at[name] ** 2 for name, share in alarm.shares))
-        pace = (1.0 - alarm.limit * over) * float(self.model.sample_time or 0.0) / alarm.window
-        mean = self._means[variable.name]
-        self._means[variable.name] = mean + pace * (min(value**2 * over, OUTLIER) - mean)
-        return self._means[variable.name] > 1.0

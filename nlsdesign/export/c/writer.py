@@ -17,7 +17,7 @@ from typing import Literal, NamedTuple
 import casadi as ca
 
 from ...foundation.errors import ExportError
-from ...model.flat import Alarm, FlatModel, Symbols, Variable
+from ...model.flat import FlatModel, Symbols, Variable
 from ..files import filled
 from .c_text import Real, comment, identifier
 from .elementary import own_functions
@@ -25,7 +25,6 @@ from .guarded_step import (
     AGREEING,
     GAP,
     MOST,
-    OUTLIER,
     ReadingNumbers,
     index_bit,
     mover,
@@ -141,12 +140,6 @@ class CWriter:
                     driver = f"state->{group}.{getattr(self.paths, group)[index]}"
                 measured[v.name] = MeasuredInput(len(measured), limits, driver)
         return measured
-
-    @cached_property
-    def means(self) -> list[tuple[int, Alarm]]:
-        """Outputs with an alarm that looks at a mean: their places, and the alarms."""
-        alarms = [(i, v.alarm) for i, v in enumerate(self.model.outputs)]
-        return [(i, alarm) for i, alarm in alarms if alarm is not None and alarm.window]
 
     @cached_property
     def tables(self) -> list[CTable]:
@@ -270,16 +263,12 @@ def guard_functions(c: CWriter) -> list[str]:
         "GAP": str(GAP),
         "MOST": str(MOST),
         "readings": limits,
-        "OUTLIER": f"{OUTLIER:g}",
-        "outlier": c.real.literal(OUTLIER),
-        "one": c.real.literal(1.0),
     }
     wanted = {
         "controller_guard.c": len(c.model.inputs) > len(c.readings),
         "controller_command.c": any(v.largest_rate < inf for v in c.model.inputs if v.name not in c.readings),
         "controller_reading.c": bool(c.readings),
         "controller_parameter.c": bool(c.parameters),
-        "controller_alarm.c": bool(c.means),
     }
     texts = [c.filled(template, values) for template, is_wanted in wanted.items() if is_wanted]
     return [line for text in texts for line in (*text.splitlines(), "")]
@@ -315,24 +304,6 @@ def take_statements(c: CWriter) -> list[str]:
     return [*(commands + readings or ["(void)inputs;"]), *beginning]
 
 
-def alarm_statements(c: CWriter) -> list[str]:
-    """Return the statements that compare outputs with what the deck explains."""
-    flag, time = f"{c.name.upper()}_INNOVATION_LARGE", float(c.model.sample_time or 0.0)
-    known = c.arguments | {v.name: f"y{i}" for i, v in enumerate(c.model.outputs)}
-    lines = [
-        f"status |= y{i} > {c.real.literal(v.alarm.limit)} ? {flag} : 0u;"
-        for i, v in enumerate(c.model.outputs)
-        if v.alarm is not None and not v.alarm.window
-    ]
-    for number, (i, alarm) in enumerate(c.means):
-        pace = time / alarm.window
-        terms = [c.real.literal(alarm.limit)]
-        terms += [f"{c.real.literal(s)} * {known[name]} * {known[name]}" for name, s in alarm.shares]
-        paces = f"{c.real.literal(pace)}, {c.real.literal(pace * alarm.limit)}"
-        lines.append(f"status |= surprising(y{i}, {' + '.join(terms)}, {paces}, &state->means[{number}]);")
-    return lines
-
-
 def step_body(c: CWriter) -> tuple[list[str], set[int]]:
     """Return the statements of the step and the indices of the looked-up numbers it uses.
 
@@ -359,11 +330,10 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
         for a, ends in ranges.items()
     )
     flag = [f"status |= ({beyond}) ? {c.name.upper()}_OUT_OF_TABLE : 0u;"] if beyond else []
-    alarms = alarm_statements(c)
     missed, derived = (sorted(named_indices(statements, letter)) for letter in (_MISSED, _DERIVED))
     one, zero = real.literal(1.0), real.literal(0.0)
     body = [
-        *c.loads([*flag, *tables, *statements, *alarms]),
+        *c.loads([*flag, *tables, *statements]),
         *(f"const {real} {_MISSED}{i} = state->readings[{i}].missed > 0u ? {one} : {zero};" for i in missed),
         *(f"const {real} {_DERIVED}{i} = state->derived[{i}];" for i in derived),
         *flag,
@@ -379,7 +349,12 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
         paths: Sequence[str] = getattr(c.paths, group)
         stores = [f"{owner}{path} = {letter}{i};" for i, path in enumerate(paths) for owner in owners]
         differences = " + ".join(f"({letter}{i} - {letter}{i})" for i in range(len(paths)))
-        stores += alarms if group == "outputs" else []
+        if group == "outputs":
+            stores += [
+                f"status |= y{i} > {real.literal(v.maximum)} ? {c.name.upper()}_INNOVATION_LARGE : 0u;"
+                for i, v in enumerate(c.model.outputs)
+                if v.plausibility is not None
+            ]
         values = {"finite": f"{differences} >= {zero}", "stores": stores}
         body += c.filled(f"controller_{group}.c", values).splitlines() if paths else []
     if not c.paths.outputs:

@@ -240,7 +240,6 @@ def _members(source: CSource) -> dict[str, str]:
         "states": [f"state.states.{path}" for path in paths.states],
         "inputs": [f"state.inputs.{path}" for path in paths.inputs],
         "readings": [f"state.readings[{k}].{name}" for k in range(len(readings)) for name in remembered],
-        "means": [f"state.means[{k}]" for k in range(len(source.writer.means))],
     }
     return {f"{group}_{k}": path for group, members in groups.items() for k, path in enumerate(members)}
 

@@ -56,7 +56,6 @@ void @name@_defaults(@name@_parameters *parameters)
     state->outputs = start_outputs;
     @take_block@
     @start_readings@
-    @start_means@
     state->begun = 0u;
     state->started = @NAME@_INTERFACE_VERSION;
     @derived@

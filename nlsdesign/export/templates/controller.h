@@ -36,7 +36,6 @@ typedef struct {
     @name@_outputs outputs; /* last good */
     @loaded@
     @readings@
-    @means@
     @derived@
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
     uint32_t started; /* @NAME@_INTERFACE_VERSION from init on; with any other number step gives NOT_STARTED */

@@ -70,7 +70,7 @@ def joined(observer: FlatModel, controller: FlatModel, *, delay: int = 1) -> Fla
     inputs, waiting = wiring.inputs(), _waiting(wiring.driven, delay)
     states = (*observer.states, *controller.states, *waiting)
     parameters = (*observer.parameters, *wiring.controller_only())
-    outputs = (*wiring.outputs(), *controller.outputs)
+    outputs = (*observer.outputs, *controller.outputs)
     tables = (*observer.tables, *controller.tables)
     for group in ((*states, *inputs), parameters, outputs):
         once: set[str] = set()
@@ -128,16 +128,6 @@ class _Wiring:
                 did_you_mean=nearest(self.controller.inputs[0].name, list(given)),
             )  # fmt: skip
         return (*own, *wishes)
-
-    def outputs(self) -> tuple[Variable, ...]:
-        """Return the outputs of the observer; alarms look at what acts, now a state."""
-        names, outputs = {self.driven.name: f"{self.driven.name}.{ACTING}"}, []
-        for v in self.observer.outputs:
-            if v.alarm is not None:
-                shares = tuple((names.get(name, name), share) for name, share in v.alarm.shares)
-                v = replace(v, alarm=replace(v.alarm, shares=shares))
-            outputs.append(v)
-        return tuple(outputs)
 
     def controller_only(self) -> tuple[Variable, ...]:
         """Return the parameters of the controller: those of the plant say that the observer keeps its own.

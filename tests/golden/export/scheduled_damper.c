@@ -209,19 +209,6 @@ static void take_over(double given, double lowest, double highest, double *taken
     }
 }
 
-/* Goes on with the mean of a squared output over what the deck explains, a single one counting 9 times that at
-   most. The pace is that of the window, less where nothing moves. Returns the flag where the mean is above 1. */
-static uint32_t surprising(double output, double explained, double pace, double at_rest, double *mean)
-{
-    const double most = 9.0;
-    const double over = 1.0 / explained;
-    const double now = output * output * over;
-    const double next = *mean + (pace - at_rest * over) * ((now < most ? now : most) - *mean);
-
-    *mean = (next >= 0.0 && next <= most) ? next : most;
-    return *mean > 1.0 ? SCHEDULED_DAMPER_INNOVATION_LARGE : 0u;
-}
-
 void scheduled_damper_defaults(scheduled_damper_parameters *parameters)
 {
     *parameters = start_parameters;
@@ -249,7 +236,6 @@ uint32_t scheduled_damper_init(scheduled_damper_state *state, const scheduled_da
     state->outputs = start_outputs;
     state->readings[0] = (scheduled_damper_reading){0};
     state->readings[0].last = start_inputs.piston.speed;
-    state->means[0] = 0.0;
     state->begun = 0u;
     state->started = SCHEDULED_DAMPER_INTERFACE_VERSION;
     return parameters == NULL ? 0u : scheduled_damper_set_parameters(state, parameters);
@@ -324,7 +310,7 @@ static uint32_t scheduled_damper_advance(scheduled_damper_state *state, schedule
     if ((y0 - y0) >= 0.0) {
         state->outputs.piston.force = y0;
         outputs->piston.force = y0;
-        status |= surprising(y0, 2.0 + 0.5 * x0 * x0 + 0.25 * u1 * u1, 0.005, 0.01, &state->means[0]);
+        status |= y0 > 3.0 ? SCHEDULED_DAMPER_INNOVATION_LARGE : 0u;
     } else {
         status |= SCHEDULED_DAMPER_OUTPUT_HELD;
         *outputs = state->outputs;

@@ -17,7 +17,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_DECK "damper"
 #define SCHEDULED_DAMPER_DECK_DIGEST "1111111111111111111111111111111111111111111111111111111111111111"
 #define SCHEDULED_DAMPER_PARENT_DIGEST "0000000000000000000000000000000000000000000000000000000000000000"
-#define SCHEDULED_DAMPER_INTERFACE_VERSION 0xe8310680u /* another one where structures, functions or units differ */
+#define SCHEDULED_DAMPER_INTERFACE_VERSION 0xa012fa8bu /* another one where structures, functions or units differ */
 
 /* Bits of the status word. Bit 16 + i names input i (of step) or parameter i (of init and
    set_parameters) as numbered below; bit 30 stands for all from 14 on: of these the refused parameters are those
@@ -52,7 +52,7 @@ typedef struct {
 /* What step gives, always finite. */
 typedef struct {
     struct {
-        double force; /* [N] Force */
+        double force; /* [N, -inf to 3] Force */
     } piston;
 } scheduled_damper_outputs;
 
@@ -90,7 +90,6 @@ typedef struct {
     scheduled_damper_inputs inputs; /* as they were taken */
     scheduled_damper_outputs outputs; /* last good */
     scheduled_damper_reading readings[1]; /* in the order of the inputs */
-    double means[1]; /* of squares over what the deck explains; an alarm above 1 */
     uint32_t begun; /* 0 until a usable reading has come, and after a state that was not finite */
     uint32_t started; /* SCHEDULED_DAMPER_INTERFACE_VERSION from init on; with any other number step gives NOT_STARTED */
 } scheduled_damper_state;

@@ -14,7 +14,7 @@ from ....foundation.errors import ArrangementError
 from ....foundation.quantity import typeset_unit
 from ....foundation.symbolic import remembered
 from ....foundation.written_numbers import prefixed
-from ....model import Alarm, FlatModel, Variable
+from ....model import FlatModel, Plausibility, Variable
 from ....model.roles import measured_motion, spring_torque
 from ....model.transform import with_products
 from ....simulation.prior import Prior, declared_prior
@@ -91,7 +91,7 @@ class _Variables:
             *rest,
             *self._factors(),
             Variable(f"{PREFIX}.weight", "1", "share of the correction, 0 where the deck explains all"),
-            Variable(f"{PREFIX}.{INFLATION}", "1", unrest, alarm=Alarm(UNEXPLAINED)),
+            Variable(f"{PREFIX}.{INFLATION}", "1", unrest, maximum=UNEXPLAINED, plausibility=Plausibility()),
         )
 
     def flat(self) -> FlatModel:
