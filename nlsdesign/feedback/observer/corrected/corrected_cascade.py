@@ -91,7 +91,13 @@ class _Variables:
             *rest,
             *self._factors(),
             Variable(f"{PREFIX}.weight", "1", "share of the correction, 0 where the deck explains all"),
-            Variable(f"{PREFIX}.{INFLATION}", "1", unrest, maximum=UNEXPLAINED, plausibility=Plausibility()),
+            Variable(
+                f"{PREFIX}.{INFLATION}",
+                "1",
+                f"{unrest}; INNOVATION_LARGE above {UNEXPLAINED:g}",
+                maximum=UNEXPLAINED,
+                plausibility=Plausibility(),
+            ),
         )
 
     def flat(self) -> FlatModel:
