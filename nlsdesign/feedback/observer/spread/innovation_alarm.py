@@ -77,11 +77,11 @@ def with_innovation_alarm(observer: FlatModel, plant: FlatModel) -> FlatModel:
         return observer
     s = observer.symbols()
     known, mean = named(observer, s), ca.SX.sym(UNEXPLAINED)
-    over = 1.0 / (limit + spring * known[estimate] ** 2 + current * known[drive] ** 2)
+    at_rest = limit / (limit + spring * known[estimate] ** 2 + current * known[drive] ** 2)
     pace = float(observer.sample_time or 0.0) / WINDOW
-    surprise = ca.fmin(known[f"{measured}.{INNOVATION}"] ** 2 * over, OUTLIER)
-    # Where nothing moves and nothing pulls, what is explained is the limit alone, and the mean stands.
-    following = mean + (pace - pace * limit * over) * (surprise - mean)
+    surprise = ca.fmin(known[f"{measured}.{INNOVATION}"] ** 2 * (1.0 / limit) * at_rest, OUTLIER)
+    # Where nothing moves and nothing pulls, what is explained is the limit, and the mean stands.
+    following = mean + (pace - pace * at_rest) * (surprise - mean)
     given = [ca.vertcat(s.state, mean), s.input, s.parameter, s.table]
     results = [ca.vertcat(s.derivative, following), ca.vertcat(s.output, following), s.signal, s.residual]
     assert observer.begin is not None  # as all observers have it
