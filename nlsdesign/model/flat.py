@@ -86,7 +86,7 @@ class Variable:
         Where a parameter's number comes from, and how far the true one may lie from it.
     plausibility
         Of a measured input: what a reading can be; ``None`` for a command. Of an output of a sampled model:
-        the deck does not explain one above ``maximum``, and the status word says so (``INNOVATION_LARGE``).
+        the deck explains no more of it than ``noticeable``; above that the status word has INNOVATION_LARGE.
     largest_rate
         Of a command: how fast it is followed at most, in its unit per second.
     """

@@ -139,6 +139,12 @@ def mover(model: FlatModel, variable: Variable) -> tuple[str, int] | None:
     )
 
 
+def explained_limit(variable: Variable) -> float:
+    """Return what the deck explains of an output at most; infinite where nothing is said of that."""
+    can = variable.plausibility
+    return can.noticeable if can is not None and can.moved_by is None and can.noticeable else math.inf
+
+
 @dataclass
 class ReadingGuard:
     """The guard of one measured input; ``last`` is its last good reading, or the start value before that."""
@@ -294,8 +300,8 @@ class GuardedModel:
             status |= STATE_RESTARTED
         if np.all(np.abs(outputs) <= self.real.largest):
             self._outputs = outputs.tolist()
-            judged = [(y, v) for y, v in zip(self._outputs, model.outputs, strict=True) if v.plausibility]
-            status |= INNOVATION_LARGE if any(y > v.maximum for y, v in judged) else 0
+            large = np.greater(self._outputs, [explained_limit(v) for v in model.outputs])
+            status |= INNOVATION_LARGE if large.any() else 0
         else:
             status |= OUTPUT_HELD
         return list(self._outputs), status

@@ -26,6 +26,7 @@ from .guarded_step import (
     GAP,
     MOST,
     ReadingNumbers,
+    explained_limit,
     index_bit,
     mover,
     reading_numbers,
@@ -351,9 +352,9 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
         differences = " + ".join(f"({letter}{i} - {letter}{i})" for i in range(len(paths)))
         if group == "outputs":
             stores += [
-                f"status |= y{i} > {real.literal(v.maximum)} ? {c.name.upper()}_INNOVATION_LARGE : 0u;"
-                for i, v in enumerate(c.model.outputs)
-                if v.plausibility is not None
+                f"status |= y{i} > {real.literal(limit)} ? {c.name.upper()}_INNOVATION_LARGE : 0u;"
+                for i, limit in enumerate(map(explained_limit, c.model.outputs))
+                if limit < inf
             ]
         values = {"finite": f"{differences} >= {zero}", "stores": stores}
         body += c.filled(f"controller_{group}.c", values).splitlines() if paths else []

@@ -272,8 +272,7 @@ def _attributes(each: FmuVariable) -> dict[str, object]:
         attributes["displayUnit"] = display_unit(v.unit)
     if v.minimum > -math.inf:
         attributes["min"] = v.minimum
-    # Above the maximum an output only sets a flag: masters may stop where "max" is exceeded.
-    if v.maximum < math.inf and not (each.causality == "output" and v.plausibility):
+    if v.maximum < math.inf:
         attributes["max"] = v.maximum
     size = v.start if each.causality == "parameter" or each.variability == "constant" else v.nominal
     if each.causality != "independent" and size:

@@ -52,7 +52,7 @@ typedef struct {
 /* What step gives, always finite. */
 typedef struct {
     struct {
-        double force; /* [N, -inf to 3] Force */
+        double force; /* [N] Force */
     } piston;
 } scheduled_damper_outputs;
 

@@ -95,8 +95,7 @@ class _Variables:
                 f"{PREFIX}.{INFLATION}",
                 "1",
                 f"{unrest}; INNOVATION_LARGE above {UNEXPLAINED:g}",
-                maximum=UNEXPLAINED,
-                plausibility=Plausibility(),
+                plausibility=Plausibility(noticeable=UNEXPLAINED),
             ),
         )
 

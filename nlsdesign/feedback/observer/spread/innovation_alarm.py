@@ -91,7 +91,7 @@ def with_innovation_alarm(observer: FlatModel, plant: FlatModel) -> FlatModel:
     words = "mean square of the innovation over what the deck explains"
     output = Variable(
         f"{measured}.{UNEXPLAINED}", "1", f"{words}; INNOVATION_LARGE above 1",
-        minimum=0.0, maximum=1.0, plausibility=Plausibility(),
+        plausibility=Plausibility(noticeable=1.0),
     )  # fmt: skip
     memory = Variable(f"{output.name}.{MEMORY}", "1", words)
     return replace(
