@@ -33,7 +33,7 @@ SPREAD, INFLATION = "standard_deviation", "unrest"
 
 UNEXPLAINED = 25.0
 """Factor on the noise beyond which no number within the spreads explains the readings: residuals that stay
-five times as large as is expected. Of 100 drawn machines 99 stay below 2, and one reaches 12."""
+five times as large as is expected. Of 600 drawn machines none reaches it in a minute."""
 
 
 class _Variables:
