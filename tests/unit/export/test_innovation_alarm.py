@@ -20,6 +20,7 @@ from nlsdesign.feedback.observer.spread.innovation_alarm import (
     declared_balance,
     explained,
 )
+from nlsdesign.model import Variable
 
 DECK, INNOVATION = "austin2015_figure_consistent", "motor.angle.innovation"
 UNEXPLAINED = "motor.angle.unexplained"
@@ -35,10 +36,9 @@ def cascade() -> nls.FlatModel:
     return designed_observer(plant(), kind="cascade").model
 
 
-def bound(observer: nls.FlatModel) -> tuple[float, float, float]:
-    return explained(
-        observer, plant(), declared_balance(plant(), "spring.torque", "motor.angle"), "motor.angle"
-    )
+def bound(observer: nls.FlatModel, machine: nls.FlatModel | None = None) -> tuple[float, float, float]:
+    balance = declared_balance(plant(), "spring.torque", "motor.angle")
+    return explained(observer, machine or plant(), balance, "motor.angle")
 
 
 def test_step_and_reference_agree_and_follow_the_formula(tmp_path: Path) -> None:
@@ -74,6 +74,10 @@ def test_the_bound_follows_from_count_and_spreads() -> None:
     expected = (3.0 * gain / values["motor.inertia"] * math.sqrt(2.0) * math.log(1.1)) ** 2
     assert drive == pytest.approx(expected, rel=0.02)
     assert limit > values["motor_encoder.quantum"] ** 2
+    noisy = replace(
+        plant(), parameters=(*plant().parameters, Variable("motor_encoder.noise", "rad", "", 2e-3))
+    )
+    assert bound(cascade(), noisy)[0] - limit == pytest.approx((3.0 * 2e-3) ** 2)
     exact = replace(plant(), parameters=tuple(replace(v, spread=0.0) for v in plant().parameters))
     bare = designed_observer(exact, kind="cascade").model
     assert UNEXPLAINED not in {v.name for v in bare.outputs}
