@@ -25,7 +25,7 @@ from nlsdesign.feedback.observer import (
 )
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
-from nlsdesign.foundation.quantity import quantity
+from nlsdesign.foundation.quantity import quantity, three_digits
 from nlsdesign.foundation.spread import EXACT
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation.prior import declared_prior
@@ -105,12 +105,26 @@ def test_errors_over_the_spread_are_those_of_their_runs(errors: SpreadErrors) ->
     assert float(errors.quantile("cascade", 0.5)[0]) <= float(errors.quantile("cascade", 0.9)[0])
     with pytest.raises(UnknownNameError):
         errors.quantile("cascad", 0.5)
-    assert "no estimator below" in str(errors)
+    head, row = (line.split("  ") for line in str(errors).splitlines()[1:3])
+    shown = dict(zip(head, row, strict=True))
+    assert shown["exact numbers"] == three_digits(1e3 * errors.exact[0, 0])
+    assert shown["90 %"] == three_digits(1e3 * errors.quantile("corrected", 0.9)[0])
+    assert shown["no estimator below"] == three_digits(1e3 * errors.bound[0])
 
 
 def test_the_bound_lies_below_what_the_deck_alone_says(errors: SpreadErrors) -> None:
     alone = np.log(1.05) * 1.2 / np.sqrt(2.0)
     assert 0.3 * alone < errors.bound[0] < alone
+
+
+def test_where_the_motion_is_unstable_no_bound_is_stated() -> None:
+    """The cable changes over at zero angle: slopes along the run grow to 1e17, the bound came out as 1e35 N·m."""
+    model = flatten(declare(load_deck("coil_cable_drive")))
+    observers = {"cascade": design_observer_with_details(model).model}
+    bench = observer_bench(model, duty=Duty(frequencies=(5.0,)))
+    found = observer_errors(observers, bench, draws=1, bounded=1)
+    assert found.bound.shape == (0,)
+    assert "not computed" in str(found)
 
 
 def test_the_bound_counts_every_input_of_a_machine() -> None:
