@@ -23,8 +23,9 @@ from nlsdesign.feedback.observer import (
     observer_bench,
     observer_errors,
 )
+from nlsdesign.feedback.observer.spread.estimator_bound import SensedTorque, estimator_bound
 from nlsdesign.foundation.deck import load_deck
-from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
 from nlsdesign.foundation.quantity import quantity, three_digits
 from nlsdesign.foundation.spread import EXACT
 from nlsdesign.model import FlatModel, flatten
@@ -117,14 +118,16 @@ def test_the_bound_lies_below_what_the_deck_alone_says(errors: SpreadErrors) -> 
     assert 0.3 * alone < errors.bound[0] < alone
 
 
-def test_where_the_motion_is_unstable_no_bound_is_stated() -> None:
-    """The cable changes over at zero angle: slopes along the run grow to 1e17, the bound came out as 1e35 N·m."""
-    model = flatten(declare(load_deck("coil_cable_drive")))
-    observers = {"cascade": design_observer_with_details(model).model}
-    bench = observer_bench(model, duty=Duty(frequencies=(5.0,)))
-    found = observer_errors(observers, bench, draws=1, bounded=1)
-    assert found.bound.shape == (0,)
-    assert "not computed" in str(found)
+def test_where_the_motion_is_unstable_there_is_no_bound(linear: FlatModel) -> None:
+    """A spring that pushes away: slopes grow by e every 2 ms, and their squares leave what a double holds."""
+    turned = {"spring.stiffness": {"minimum": -10.0, "start": -1.7}}
+    unstable = replace(
+        linear, parameters=tuple(replace(v, **turned.get(v.name, {})) for v in linear.parameters)
+    )
+    sensed = SensedTorque("spring.torque", "motor.angle", 0.767e-3)
+    known = declared_prior(linear).only(["spring.stiffness"])
+    with pytest.raises(ConvergenceError, match="not decided by its inputs"):
+        estimator_bound(unstable, known, np.ones((1, 2000)), sensed)
 
 
 def test_the_bound_counts_every_input_of_a_machine() -> None:
