@@ -68,11 +68,14 @@ def covariance_by_records(rows: Sequence[Piece], prior: Array, known: Array) -> 
     """Return the covariance where residuals hold what a model lacks, at least what is known without that.
 
     That misses alike in all segments of a record, whose motion is one and mostly repeats itself, so the
-    records alone are independent of each other. Fewer than three tell nothing of a scatter.
+    records alone are independent of each other, and fewer than three tell nothing of a scatter. What comes or
+    goes in the middle of each record cancels in its sum, so their halves are asked as well.
     """
     if len({each.record for each in rows}) < _LEAST_RECORDS:
         return known
-    return _at_least(_scatter(rows, prior, [np.zeros(len(each.time), dtype=int) for each in rows]), known)
+    whole = [np.zeros(len(each.time), dtype=int) for each in rows]
+    halves = [(each.time > 0.5 * each.time[-1:]).astype(int) for each in rows]
+    return _at_least(_scatter(rows, prior, halves), _at_least(_scatter(rows, prior, whole), known))
 
 
 def _scatter(rows: Sequence[Piece], prior: Array, segments: Sequence[Indices]) -> Array:

@@ -79,6 +79,21 @@ def test_what_a_model_lacks_throughout_a_record_scatters_from_record_to_record()
     assert stated[1] == pytest.approx(true, rel=0.25)
 
 
+def test_what_comes_in_the_middle_of_each_record_is_no_better_known_than_the_change() -> None:
+    """A load that is put on halfway: the fitted one lies between, and no record differs from another."""
+    draw, none, x = np.random.default_rng(4), np.zeros((0, 1)), slopes()[:, 1:]
+    late = np.where(np.arange(COUNT) < COUNT // 2, 1.0, 2.0)[:, None]
+    runs = [(late * x).ravel() + 0.1 * draw.standard_normal(COUNT) for _ in range(4)]
+    value = float(np.linalg.lstsq(np.vstack([x] * 4), np.concatenate(runs), rcond=None)[0][0])
+    time = STEP * np.arange(COUNT)
+    pieces = [Piece("motor", f"r{k}", time, run - value * x[:, 0], x) for k, run in enumerate(runs)]
+    known = robust_covariance(pieces, none)
+    error = float(np.sqrt(covariance_by_records(pieces, none, known)[0, 0]))
+    assert value == pytest.approx(1.5, abs=0.02)
+    assert 2.0 * float(np.sqrt(known[0, 0])) < 0.3, "or the test would show nothing"
+    assert error == pytest.approx(0.5 / np.sqrt(8.0), rel=0.15), "eight halves, each 0.5 away"
+
+
 def test_two_records_tell_nothing_of_a_scatter() -> None:
     pieces = wanting(2, 0)[1]
     known = robust_covariance(pieces, np.zeros((0, 1)))
