@@ -29,7 +29,7 @@ from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import run_compiler
 from nlsdesign.export.files import template
 from nlsdesign.feedback.control import joined
-from nlsdesign.feedback.observer import design_corrected_observer
+from nlsdesign.feedback.observer import designed_observer
 
 PAGE: Final = Path(__file__).parents[1] / "docs" / "firmware.md"
 BOARD: Final = Path(__file__).parent / "firmware"
@@ -117,8 +117,7 @@ def made(processor: Processor, real: str, folder: Path, *, corrected: bool = Fal
     """Export the machine and its controller, and compile the example program as it was generated."""
     actuator = nls.declare(nls.load_deck(DECK))
     plant = nls.flatten(actuator, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
-    cascade = nls.design_observer(plant, gain=nls.observer.CascadeGain())
-    observer = design_corrected_observer(plant).model if corrected else cascade
+    observer = designed_observer(plant, kind="corrected" if corrected else "cascade").model
     both = joined(observer, nls.torque_controller(plant, law=nls.control.ScheduledTorque()))
     source = export_c(both, folder, real=real, name="torque_loop")
     write_examples(source)

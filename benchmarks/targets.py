@@ -38,7 +38,7 @@ class Goal:
 
 
 GOALS = {
-    "cascade observer": Goal(400, 16_384), "cascade observer and controller": Goal(700, 16_384),
+    "cascade observer": Goal(440, 16_384), "cascade observer and controller": Goal(700, 16_384),
     "corrected observer": Goal(1500, 12_288),
 }  # fmt: skip
 

@@ -106,7 +106,12 @@ def observer(
         raise click.MissingParameter(ctx=context, param_type="option", param_hint="'--deck'")
     from ..components import declare
     from ..export import export_c, quickest
-    from ..feedback.observer import certified_design, designed_observer, errors_beside
+    from ..feedback.observer import (
+        certified_design,
+        designed_observer,
+        errors_beside,
+        with_innovation_alarm,
+    )
     from ..foundation.deck import load_deck
     from ..foundation.progress import Steps
     from ..model import flatten
@@ -135,7 +140,9 @@ def observer(
             errors = errors_beside(
                 plant, chosen, draws=options["draws"], sample_time=sample_time, translate=quickest(), **roles
             )
-    model = chosen.model if proved is None else proved.stated(certified_design(proved, plant).model)
+    model = chosen.model
+    if proved is not None:
+        model = proved.stated(with_innovation_alarm(certified_design(proved, plant).model, plant))
     source = export_c(model, out, real=real, name="observer")
     files = [source.header, source.source, source.selftest]
     if proved is not None:
@@ -286,7 +293,7 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     """Check a certificate again, without the solver. Exit status 1 where it does not hold."""
     from ..components import declare
     from ..export import export_c
-    from ..feedback.observer import CodeToCompare, read_certificate, verify
+    from ..feedback.observer import CodeToCompare, read_certificate, verify, with_innovation_alarm
     from ..foundation.deck import load_deck, read_deck
     from ..model import flatten
 
@@ -294,9 +301,15 @@ def verify_certificate(certificate: Path, deck_name: str | None, code: Path | No
     given = load_deck(deck_name).path.read_text(encoding="utf-8-sig") if deck_name else None
     name, text = proved.deck
     model = flatten(declare(read_deck(text, Path(f"{name}.toml")))) if text else None
+
+    def written(observer: FlatModel, *given: Any, **named: Any) -> object:
+        return export_c(
+            observer if model is None else with_innovation_alarm(observer, model), *given, **named
+        )
+
     result = verify(
         proved, untouched=untouched, model=model, deck=given,
-        code=None if code is None else CodeToCompare(code, export_c),
+        code=None if code is None else CodeToCompare(code, written),
     )  # fmt: skip
     if as_json:
         checks = [{"name": c.name, "holds": c.holds, "detail": c.detail} for c in result.checks]

@@ -85,7 +85,7 @@ class Variable:
     source, spread
         Where a parameter's number comes from, and how far the true one may lie from it.
     plausibility
-        Of a measured input: what a reading can be; ``None`` for a command.
+        Of a measured input: what a reading can be. Of an output: ``noticeable``, above which it sets a flag.
     largest_rate
         Of a command: how fast it is followed at most, in its unit per second.
     """

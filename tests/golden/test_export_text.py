@@ -54,7 +54,7 @@ def damper() -> FlatModel:
                 "memory.gain", "N*s/m", "Weight of the past", 0.75, 1.0, 0.0, 10.0, "bench 2024-05-01", 0.1
             ),
         ),
-        (Variable("piston.force", "N", "Force"),),
+        (Variable("piston.force", "N", "Force", plausibility=Plausibility(noticeable=3.0)),),
         (Variable("force.squared", "N^2", "Square of the force"),),
         equations,
         0.01,

@@ -39,6 +39,7 @@ NOT_STARTED = 1 << 11
 COMMAND_SLOWED = 1 << 12
 SAMPLE_LATE = 1 << 13
 SAMPLE_REPEATED = 1 << 14
+INNOVATION_LARGE = 1 << 15
 FIRST_INDEX_BIT, LAST_INDEX_BIT = 16, 30
 
 STATUS_BITS = {
@@ -75,6 +76,10 @@ STATUS_BITS = {
     ),
     "SAMPLE_LATE": (SAMPLE_LATE, "of step_at: samples are missing before this one"),
     "SAMPLE_REPEATED": (SAMPLE_REPEATED, "of step_at: the sample came twice; the last outputs were given"),
+    "INNOVATION_LARGE": (
+        INNOVATION_LARGE,
+        "readings have differed from what is expected by more than the deck explains; nothing was changed",
+    ),
 }
 
 
@@ -132,6 +137,12 @@ def mover(model: FlatModel, variable: Variable) -> tuple[str, int] | None:
     raise ExportError(
         f"input '{variable.name}' of '{model.name}'", f"is moved by '{name}', which is no input or state"
     )
+
+
+def explained_limit(variable: Variable) -> float:
+    """Return what the deck explains of an output at most; infinite where nothing is said of that."""
+    can = variable.plausibility
+    return can.noticeable if can is not None and can.moved_by is None and can.noticeable else math.inf
 
 
 @dataclass
@@ -289,6 +300,8 @@ class GuardedModel:
             status |= STATE_RESTARTED
         if np.all(np.abs(outputs) <= self.real.largest):
             self._outputs = outputs.tolist()
+            large = np.greater(self._outputs, [explained_limit(v) for v in model.outputs])
+            status |= INNOVATION_LARGE if large.any() else 0
         else:
             status |= OUTPUT_HELD
         return list(self._outputs), status

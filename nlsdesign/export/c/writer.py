@@ -26,6 +26,7 @@ from .guarded_step import (
     GAP,
     MOST,
     ReadingNumbers,
+    explained_limit,
     index_bit,
     mover,
     reading_numbers,
@@ -349,6 +350,12 @@ def step_body(c: CWriter) -> tuple[list[str], set[int]]:
         paths: Sequence[str] = getattr(c.paths, group)
         stores = [f"{owner}{path} = {letter}{i};" for i, path in enumerate(paths) for owner in owners]
         differences = " + ".join(f"({letter}{i} - {letter}{i})" for i in range(len(paths)))
+        if group == "outputs":
+            stores += [
+                f"status |= y{i} > {real.literal(limit)} ? {c.name.upper()}_INNOVATION_LARGE : 0u;"
+                for i, limit in enumerate(map(explained_limit, c.model.outputs))
+                if limit < inf
+            ]
         values = {"finite": f"{differences} >= {zero}", "stores": stores}
         body += c.filled(f"controller_{group}.c", values).splitlines() if paths else []
     if not c.paths.outputs:

@@ -54,7 +54,7 @@ static int32_t model_sample(model_memory *memory, const double u[], double x[], 
 static int model_directional(const model_memory *memory, int32_t status, const double x[], const double dx[],
                              const double du[], const double dp[], double dy[], double ds[])
 {
-    if (((uint32_t)status & ~@NAME@_OUT_OF_TABLE) != 0u) {
+    if (((uint32_t)status & ~(@NAME@_OUT_OF_TABLE | @NAME@_INNOVATION_LARGE)) != 0u) {
         return 0;
     }
     @directional@

@@ -30,6 +30,7 @@ from .spread.choice import (
     designed_observer,
     least_torque_error,
 )
+from .spread.innovation_alarm import with_innovation_alarm
 from .spread.observer_bench import ObserverBench, observer_bench
 from .spread.spread_errors import SpreadErrors, errors_beside, observer_errors
 
@@ -74,5 +75,6 @@ __all__ = [
     "observer_errors",
     "read_certificate",
     "verify",
+    "with_innovation_alarm",
     "write_certificate",
 ]

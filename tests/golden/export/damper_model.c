@@ -107,7 +107,7 @@ static int32_t model_sample(model_memory *memory, const double u[], double x[], 
 static int model_directional(const model_memory *memory, int32_t status, const double x[], const double dx[],
                              const double du[], const double dp[], double dy[], double ds[])
 {
-    if (((uint32_t)status & ~SCHEDULED_DAMPER_OUT_OF_TABLE) != 0u) {
+    if (((uint32_t)status & ~(SCHEDULED_DAMPER_OUT_OF_TABLE | SCHEDULED_DAMPER_INNOVATION_LARGE)) != 0u) {
         return 0;
     }
     const double raw_0 = (memory->inputs.piston.speed + 1.0) * 1.0;

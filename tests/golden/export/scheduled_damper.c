@@ -310,6 +310,7 @@ static uint32_t scheduled_damper_advance(scheduled_damper_state *state, schedule
     if ((y0 - y0) >= 0.0) {
         state->outputs.piston.force = y0;
         outputs->piston.force = y0;
+        status |= y0 > 3.0 ? SCHEDULED_DAMPER_INNOVATION_LARGE : 0u;
     } else {
         status |= SCHEDULED_DAMPER_OUTPUT_HELD;
         *outputs = state->outputs;

@@ -37,6 +37,7 @@ extern "C" {
 #define SCHEDULED_DAMPER_COMMAND_SLOWED 0x1000u /* a command changed faster than the drive can follow; what it can reach was used */
 #define SCHEDULED_DAMPER_SAMPLE_LATE 0x2000u /* of step_at: samples are missing before this one */
 #define SCHEDULED_DAMPER_SAMPLE_REPEATED 0x4000u /* of step_at: the sample came twice; the last outputs were given */
+#define SCHEDULED_DAMPER_INNOVATION_LARGE 0x8000u /* readings have differed from what is expected by more than the deck explains; nothing was changed */
 
 /* What step reads. */
 typedef struct {

@@ -15,7 +15,7 @@ from benchmarks._generated import DECK, supervised
 from nlsdesign.export import CORTEX_M4F
 from nlsdesign.export.compilation.target_run import TargetMeasurement, TargetRun, missing_emulator
 from nlsdesign.feedback.control import joined
-from nlsdesign.feedback.observer import design_observer_with_details
+from nlsdesign.feedback.observer import design_observer_with_details, designed_observer
 
 needs_emulator = pytest.mark.skipif(bool(missing_emulator()), reason=missing_emulator())
 
@@ -29,7 +29,7 @@ def chosen(name, plant):
     """Cascade observer, it with the controller, or the default observer."""
     if name == "corrected observer":
         return nls.design_observer(plant)
-    cascade = design_observer_with_details(plant).model
+    cascade = designed_observer(plant, kind="cascade").model
     if name == "cascade observer":
         return cascade
     return joined(cascade, nls.torque_controller(plant, law=nls.control.PidTorque()))
@@ -65,7 +65,7 @@ def test_a_missed_goal_is_named(plant, monkeypatch):
     assert targets.missed([targets.Row("cascade observer", "float", CORTEX_M4F, cost, False, faults)]) == [
         "cascade observer in float: the self-test fails",
         "cascade observer in float: a fault is neither forgotten after 0.3 s nor flagged",
-        "cascade observer: 460 instructions, the goal is 400",
+        "cascade observer: 460 instructions, the goal is 440",
         "cascade observer: 20000 B of flash, the goal is 16384",
     ]
 

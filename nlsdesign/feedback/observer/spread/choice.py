@@ -40,6 +40,7 @@ from ..scheduling.scheduled import ObserverDesign, check_sampling, design_observ
 from ..scheduling.step import CascadeGain, FittedGain, GainRule, SteadyStateKalman
 from ..scheduling.table import Grid
 from .estimator_bound import SensedTorque, estimator_bound, rms_over
+from .innovation_alarm import with_innovation_alarm
 from .observer_bench import ObserverBench, observer_bench
 
 BEST, CORRECTED, CASCADE, CERTIFIED = "best", "corrected", "cascade", "certified"
@@ -117,6 +118,7 @@ def choose_observer(
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
+    plain = with_alarm(cascade, model)
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     unit = typeset_unit(model.variable(estimate).unit)
     try:
@@ -126,13 +128,13 @@ def choose_observer(
         learned = expected_error(model, learning, duty)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
-        return ObserverOfChoice(cascade, f"cascade, for it cannot be corrected: {error}", ())
+        return ObserverOfChoice(plain, f"cascade, for it cannot be corrected: {error}", ())
     alone = learning.balance.before
     sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
     both = f"expected over the spread {sizes} of the cascade"
     if learned < alone:
         return ObserverOfChoice(learning, f"corrected: {both}", (alone, learned))
-    return ObserverOfChoice(cascade, f"cascade: the corrected one has {both}", (alone, learned))
+    return ObserverOfChoice(plain, f"cascade: the corrected one has {both}", (alone, learned))
 
 
 def expected_error(model: FlatModel, design: CorrectedDesign, duty: Duty | None) -> float:
@@ -283,7 +285,8 @@ def designed_observer(
     if kind == CORRECTED:
         return DesignedObserver(kind, design_corrected_observer(plant, **named))
     if kind == "published":
-        return DesignedObserver(kind, design_observer_with_details(plant, form=PaperForm(), **named))
+        design = design_observer_with_details(plant, form=PaperForm(), **named)
+        return DesignedObserver(kind, with_alarm(design, plant))
     gains: dict[str, Callable[[], Any]] = {
         CASCADE: CascadeGain,
         CERTIFIED: lambda: CertifiedGain(decay=decay),
@@ -292,7 +295,12 @@ def designed_observer(
     if kind not in gains:
         raise unknown_name("kind of observer", kind, KINDS)
     gain = gains[kind]()
-    return DesignedObserver(kind, design_observer_with_details(plant, gain=gain, **named))
+    return DesignedObserver(kind, with_alarm(design_observer_with_details(plant, gain=gain, **named), plant))
+
+
+def with_alarm(design: ObserverDesign, plant: FlatModel) -> ObserverDesign:
+    """Return a design whose observer says when the deck no longer explains its innovation."""
+    return replace(design, model=with_innovation_alarm(design.model, plant))
 
 
 def _kalman(plant: FlatModel, measured: str, sample_time: float) -> SteadyStateKalman:
