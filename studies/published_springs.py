@@ -564,9 +564,9 @@ def write(out: Path, results: Results, *, drawn: bool) -> None:
             HEADS,
             tuple(rows),
             caption="Theirs → ours. Radius: the largest distance of the cam from its centre. Force: the "
-            "largest of one coil. Theirs of ETH and WPI follow from their numbers by the balance of work; radii "
-            "of Michigan are of their published points, their forces follow. Miss: of the largest torque of its "
-            "side.",
+            "largest of one coil. Theirs of ETH and WPI follow from their numbers by the balance of work; "
+            "radii of Michigan are of their published points, their forces follow. Miss: of the largest "
+            "torque of its side.",
         ),
         *(
             section
