@@ -561,8 +561,8 @@ def write(out: Path, results: Results, *, drawn: bool) -> None:
         out / "report.html",
         TableSection(
             "Theirs, ours",
-            HEADS,
-            tuple(rows),
+            HEADS[:-1],
+            tuple(row[:-1] for row in rows),
             caption="Theirs → ours. Radius: the largest distance of the cam from its centre. Force: the "
             "largest of one coil. Theirs of ETH and WPI follow from their numbers by the balance of work; "
             "radii of Michigan are of their published points, their forces follow. Miss: of the largest "
@@ -572,7 +572,15 @@ def write(out: Path, results: Results, *, drawn: bool) -> None:
             section
             for theirs, parts in folded.items()
             for section in (
-                Chapter(theirs.name, f"Theirs: {theirs.follows}. Source: {theirs.source}."),
+                Chapter(
+                    theirs.name,
+                    "\n\n".join(
+                        [
+                            f"Theirs: {theirs.follows}. Source: {theirs.source}.",
+                            *(f"{o.kind}: {o.verdict}" for o in results.answers if o.published is theirs),
+                        ]
+                    ),
+                ),
                 FoldedSection("Torque of ours over the angle", tuple(parts)),
             )
         ),
