@@ -77,16 +77,16 @@ class _Numbers:
     """The numbers of the file as quantities."""
 
     def __init__(self, tables: Mapping[str, Any], file: str) -> None:
-        self._tables, self._file = tables, file
+        self._tables, self.file = tables, file
 
     def raw(self, table: str, field: str) -> Any:
         """Return what stands in a field."""
         fields = self._tables.get(table, {})
         if not isinstance(fields, dict):
-            raise DeckError(f"{self._file}: {table}", "is not a table", next_step=f"write [{table}]")
+            raise DeckError(f"{self.file}: {table}", "is not a table", next_step=f"write [{table}]")
         if field not in fields:
             raise DeckError(
-                f"{self._file}: {table}.{field}", "is missing", did_you_mean=nearest(field, fields),
+                f"{self.file}: {table}.{field}", "is missing", did_you_mean=nearest(field, fields),
                 next_step="give the file of the rig, as its makers wrote it",
             )  # fmt: skip
         return fields[field]
@@ -96,17 +96,21 @@ class _Numbers:
         value = self.raw(table, field)
         row = value if isinstance(value, list) else [value]
         if not row or not all(isinstance(v, int | float) and abs(v) < _LARGEST for v in row):
-            raise DeckError(f"{self._file}: {table}.{field}", f"{brief(value)} is no number")
+            raise DeckError(f"{self.file}: {table}.{field}", f"{brief(value)} is no number")
         return quantity(
             tuple(row) if isinstance(value, list) else value,
             unit,
-            source=f"{self._file}, {table}.{field}",
+            source=f"{self.file}, {table}.{field}",
             spread=spread,
         )
 
 
 def _rubber(numbers: _Numbers) -> Specimen:
     length = numbers("rubber", "L0_m", "m")
+    if length.number <= 0.0:
+        raise DeckError(
+            f"{numbers.file}: rubber.L0_m", f"{length.number:g} m is no length", next_step="give it in metres"
+        )
     engaged = significant(d / length.number for d in numbers("rubber", "delta_i_m", "m").values)
     return specimen(
         area=numbers("rubber", "A0_m2", "m^2"),

@@ -10,7 +10,8 @@ finite freedom dynamics),
 
     ω⁺ = prox(ω_free) = sign(ω_free) max(|ω_free| − level Δt/J, 0)
 
-with the step Δt, so a stuck drive has exactly zero speed.  Without backlash both sides are one inertia.
+with the step Δt, so a stuck drive has exactly zero speed.  Without backlash both sides are one inertia.  A stop at the end
+of the cam takes all speed.
 Positions follow with the new speed (leapfrog).
 """
 
@@ -18,7 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from math import exp, sin
+from math import copysign, exp, sin
 from typing import Any, TypeVar
 
 import numpy as np
@@ -36,7 +37,7 @@ SERVO_DAMPING = 0.8
 CURRENT_LIMIT = 12.0  # A
 CAM_GRID = 5.0e-4  # rad
 CONTROLLED = round(1.0e-3 / STEP)  # steps from one call of a controller to the next
-CAM_END = 1.35  # rad; nothing turns as far as this
+CAM_END = 1.35  # rad; records end before, a machine that hunts is stopped here
 SPOT_PLACE, SPOT_WIDTH = 0.25, 0.06  # rad, of the rubbing spot
 BUMP_PLACE, BUMP_WIDTH = 0.4, 0.15  # rad, of the error of the contour
 
@@ -219,4 +220,7 @@ def simulate(
         else:
             speed = prox(speed + STEP * (push - load) / inertia, friction / inertia)
             cam = motor = motor + STEP * speed
+        if not -CAM_END <= cam - offset <= CAM_END:
+            back = copysign(CAM_END, cam - offset) + offset - cam
+            motor, cam, speed, cam_speed = motor + back, cam + back, 0.0, 0.0
     return History(command.time, *np.array(rows).T)

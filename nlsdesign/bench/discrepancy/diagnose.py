@@ -59,6 +59,8 @@ from .selection.trials import Step, without_twins
 from .tearing import blocks_of
 
 _CRITERIA = Criteria()
+_MOST_OF_IT = 0.5
+"""Share of the effort left beyond which columns are asked about before effects, few of which are as large."""
 _RUNNERS_UP, _MOST_ALIASES = 6, 3
 """So many of each are shown; a longer list is not read."""
 
@@ -118,7 +120,7 @@ def diagnose(
     case = case_of(actuator, Bench(chosen_by, blocks_of(flatten(actuator), records.signals)), criteria)
     case, base = case.read_as_declared(case.comparison.base(actuator))
     effects = known_effects() if catalogue is None else catalogue
-    answer = _Answer(case, base, *_decided(case, base, effects, progress))
+    answer = _Answer(case, base, *_decided(case, base, effects, progress, measured=chosen_by))
     other = answer.case.read_as_inferred_beside(answer.outcome, answer.decision.verdict)
     if other is not None:
         progress("reading inputs between their samples as they run beside what was found")
@@ -164,8 +166,14 @@ def _answer_anew(case: Case, catalogue: Sequence[EffectFunction], progress: Call
 
 
 def _decided(
-    case: Case, base: Hypothesis, catalogue: Sequence[EffectFunction], progress: Callable[[str], None]
+    case: Case,
+    base: Hypothesis,
+    catalogue: Sequence[EffectFunction],
+    progress: Callable[[str], None],
+    *,
+    measured: RecordSet | None = None,
 ) -> tuple[Outcome, _Decision]:
+    """Return what explains the records; ``measured``: they, to ask whether a column is what is stated."""
     records = case.bench.records
     findings = [
         *records.findings,
@@ -174,6 +182,8 @@ def _decided(
         *scale_findings(case.comparison, base),
     ]
     findings = findings or drive_findings(case.actuator, case.comparison, base)
+    if measured is not None and not findings:
+        findings = misread_findings(case.actuator, measured, case.comparison, base, least=_MOST_OF_IT)
     lagging = lagging_forces(case.actuator, records)
     if findings:
         findings += lagging.findings

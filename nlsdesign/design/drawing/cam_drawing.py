@@ -91,38 +91,41 @@ def _solid(part: CamPart) -> Any:
     floor = top - MM * part.number("groove_depth") if part.base_radius else 0.0
     shape = _cylinder(0.0, 0.0, MM * part.base_radius, floor) if part.base_radius else None
     for outline in part.outlines:
-        from OCP.BRepBuilderAPI import (
-            BRepBuilderAPI_MakeEdge,
-            BRepBuilderAPI_MakeFace,
-            BRepBuilderAPI_MakeWire,
-        )
-        from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
-        from OCP.GC import GC_MakeArcOfCircle
-        from OCP.gp import gp_Pnt, gp_Vec
-
-        def point(place: Any) -> Any:
-            return gp_Pnt(MM * float(place[0]), MM * float(place[1]), floor)
-
-        wire = BRepBuilderAPI_MakeWire()
-        for start, end, bulge in zip(*outline.ends, strict=True):
-            if bulge == 0.0:
-                wire.Add(BRepBuilderAPI_MakeEdge(point(start), point(end)).Edge())
-                continue
-            # The middle of the arc lies bulge·chord/2 to the right of the chord's middle.
-            chord = end - start
-            middle = (start + end) / 2.0 + np.array([chord[1], -chord[0]]) * (bulge / 2.0)
-            arc = GC_MakeArcOfCircle(point(start), point(middle), point(end)).Value()
-            wire.Add(BRepBuilderAPI_MakeEdge(arc).Edge())
-        face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
-        lip = BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, top - floor)).Shape()
+        lip = _prism(outline, floor, top)
         shape = lip if shape is None else BRepAlgoAPI_Fuse(shape, lip).Shape()
     for hole in part.holes:
         x, y = MM * hole.centre
         height = floor if hole.base_only else top
-        shape = BRepAlgoAPI_Cut(shape, _cylinder(x, y, MM * hole.diameter / 2.0, height)).Shape()
+        tool = _cylinder(x, y, MM * hole.diameter / 2.0, height)
+        if hole.outline is not None:
+            tool = _prism(hole.outline, 0.0, height)
+        shape = BRepAlgoAPI_Cut(shape, tool).Shape()
     if shape is None or not BRepCheck_Analyzer(shape).IsValid():
         raise ExportError("STEP", "Open CASCADE made no valid solid", next_step="take DXF or SVG instead")
     return shape
+
+
+def _prism(outline: ArcPath, bottom: float, top: float) -> Any:
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_MakeEdge, BRepBuilderAPI_MakeFace, BRepBuilderAPI_MakeWire
+    from OCP.BRepPrimAPI import BRepPrimAPI_MakePrism
+    from OCP.GC import GC_MakeArcOfCircle
+    from OCP.gp import gp_Pnt, gp_Vec
+
+    def point(place: Any) -> Any:
+        return gp_Pnt(MM * float(place[0]), MM * float(place[1]), bottom)
+
+    wire = BRepBuilderAPI_MakeWire()
+    for start, end, bulge in zip(*outline.ends, strict=True):
+        if bulge == 0.0:
+            wire.Add(BRepBuilderAPI_MakeEdge(point(start), point(end)).Edge())
+            continue
+        # The middle of the arc lies bulge·chord/2 to the right of the chord's middle.
+        chord = end - start
+        middle = (start + end) / 2.0 + np.array([chord[1], -chord[0]]) * (bulge / 2.0)
+        arc = GC_MakeArcOfCircle(point(start), point(middle), point(end)).Value()
+        wire.Add(BRepBuilderAPI_MakeEdge(arc).Edge())
+    face = BRepBuilderAPI_MakeFace(wire.Wire()).Face()
+    return BRepPrimAPI_MakePrism(face, gp_Vec(0.0, 0.0, top - bottom)).Shape()
 
 
 def _cylinder(x: float, y: float, radius: float, height: float) -> Any:
@@ -158,6 +161,9 @@ def part_dxf(part: CamPart, *, note: str = "") -> str:
     if part.base_radius:
         space.add_circle((0.0, 0.0), _rounded(part.base_radius), dxfattribs={"layer": "BASE"})
     for hole in part.holes:
+        if hole.outline is not None:
+            _add_path(document, hole.outline, "HOLES")
+            continue
         x, y = (_rounded(value) for value in hole.centre)
         space.add_circle((x, y), _rounded(hole.diameter / 2.0), dxfattribs={"layer": "HOLES"})
     for roller in part.rollers:
@@ -278,7 +284,10 @@ def part_svg(part: CamPart, *, note: str = "") -> str:
             if hole.base_only
             else 'fill="white" stroke="#202020" stroke-width="0.12"'
         )
-        body.append(_circle(hole.centre[0], hole.centre[1], hole.diameter / 2.0, look))
+        if hole.outline is not None:
+            body.append(f'<path d="{path_data(hole.outline)}" {look}/>')
+        else:
+            body.append(_circle(hole.centre[0], hole.centre[1], hole.diameter / 2.0, look))
     look = 'fill="none" stroke="#b03020" stroke-width="0.12"'
     body += [_circle(each.centre[0], each.centre[1], each.diameter / 2.0, look) for each in part.rollers]
     body += [
@@ -456,11 +465,17 @@ def _part_texts(
 def edge_csv(part: CamPart, *, note: str = "") -> str:
     """Return the lines and arcs of the edges, then the holes, one a row, in mm."""
     rows = []
-    for index, outline in enumerate(part.outlines, start=1):
+    closed = [(f"edge {index}", outline) for index, outline in enumerate(part.outlines, start=1)]
+    closed += [(hole.name, hole.outline) for hole in part.holes if hole.outline is not None]
+    for name, outline in closed:
         for start, end, radius, centre in zip(*outline.ends[:2], outline.radii, outline.centres, strict=True):
             arc = [radius, *centre] if np.isfinite(radius) else [None] * 3
-            rows.append((f"edge {index}", [*start, *end, *arc]))
-    rows += [(hole.name, [None] * 4 + [hole.diameter / 2.0, *hole.centre]) for hole in part.holes]
+            rows.append((name, [*start, *end, *arc]))
+    rows += [
+        (hole.name, [None] * 4 + [hole.diameter / 2.0, *hole.centre])
+        for hole in part.holes
+        if hole.outline is None
+    ]
     if part.base_radius:
         rows.append(("base", [None] * 4 + [part.base_radius, 0.0, 0.0]))
     head = [

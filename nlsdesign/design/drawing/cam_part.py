@@ -7,6 +7,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,14 +17,59 @@ from ...foundation.quantity import MM, Quantity
 from .arc_path import ArcPath, crossing, distance_to, inside_of
 
 
+class Key(NamedTuple):
+    """A parallel key in mm: bores above and up to, its sides, depth in the hub, height that presses it.
+
+    Source: DIN 6885-1.
+    """
+
+    above: float
+    up_to: float
+    width: float
+    height: float
+    depth: float
+    pressed: float
+
+    def __str__(self) -> str:
+        return f"{self.width:g} x {self.height:g} mm (DIN 6885-1)"
+
+
+KEYS = (
+    Key(6.0, 8.0, 2.0, 2.0, 1.0, 0.8),
+    Key(8.0, 10.0, 3.0, 3.0, 1.4, 1.2),
+    Key(10.0, 12.0, 4.0, 4.0, 1.8, 1.5),
+    Key(12.0, 17.0, 5.0, 5.0, 2.3, 2.0),
+    Key(17.0, 22.0, 6.0, 6.0, 2.8, 2.5),
+    Key(22.0, 30.0, 8.0, 7.0, 3.3, 3.0),
+)
+
+
 @dataclass(frozen=True, eq=False)
 class Hole:
-    """A round hole."""
+    """A round hole, with or without a keyway towards y."""
 
     name: str  # what it is for
     centre: Array  # shape (2,), in m
     diameter: float  # in m
     base_only: bool = False  # whether it goes through the base plate alone, under cable and lips
+    key: Key | None = None  # whose keyway it has
+
+    @property
+    def reach(self) -> float:
+        """Distance from the centre to the material that is farthest from it, in m."""
+        return self.diameter / 2.0 + (0.0 if self.key is None else self.key.depth / MM)
+
+    @property
+    def outline(self) -> ArcPath | None:
+        """Closed edge of a hole with a keyway; ``None`` of a round one."""
+        if self.key is None:
+            return None
+        half, radius = self.key.width / 2.0 / MM, self.diameter / 2.0
+        corner = math.sqrt(radius**2 - half**2)
+        points = [(half, corner), (half, self.reach), (-half, self.reach), (-half, corner), (0.0, -radius)]
+        bulge = math.tan((math.pi - math.asin(half / radius)) / 4.0)
+        bulges = np.array([0.0, 0.0, 0.0, bulge, bulge])
+        return ArcPath(self.centre + np.array(points), bulges, closed=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,9 +249,10 @@ def _check_anchor(part: CamPart) -> None:
 def _check_hole(hole: Hole, part: CamPart, polygons: list[Array]) -> None:
     wall = part.number("minimum_wall")
     away = MM * math.hypot(*hole.centre)
-    what = f"{hole.name} of {MM * hole.diameter:.4g} mm at {away:.4g} mm from the axis"
+    keyed = "" if hole.key is None else f" with a keyway {hole.key.depth:g} mm deep"
+    what = f"{hole.name} of {MM * hole.diameter:.4g} mm{keyed} at {away:.4g} mm from the axis"
     if part.base_radius:
-        left = part.base_radius - math.hypot(*hole.centre) - hole.diameter / 2.0
+        left = part.base_radius - math.hypot(*hole.centre) - hole.reach
         if left < wall - _SLACK:
             raise ValueRangeError(
                 what, f"leaves {MM * left:.4g} mm to the rim, minimum_wall is {MM * wall:.4g} mm",
@@ -214,10 +261,7 @@ def _check_hole(hole: Hole, part: CamPart, polygons: list[Array]) -> None:
     if hole.base_only:
         return
     inside = any(inside_of(hole.centre, polygon) for polygon in polygons)
-    left = (
-        min(float(distance_to(hole.centre[None, :], polygon)[0]) for polygon in polygons)
-        - hole.diameter / 2.0
-    )
+    left = min(float(distance_to(hole.centre[None, :], polygon)[0]) for polygon in polygons) - hole.reach
     if not inside and not part.base_radius:
         raise ValueRangeError(
             what, "lies outside the material",
@@ -235,7 +279,7 @@ def _check_between_holes(part: CamPart) -> None:
     wall = part.number("minimum_wall")
     for index, one in enumerate(part.holes):
         for other in part.holes[index + 1 :]:
-            left = math.hypot(*(one.centre - other.centre)) - (one.diameter + other.diameter) / 2.0
+            left = math.hypot(*(one.centre - other.centre)) - one.reach - other.reach
             if left < wall - _SLACK:
                 raise ValueRangeError(
                     f"{one.name} and {other.name}",

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...foundation.arrays import Array
 from ...foundation.errors import ArrangementError, ValueRangeError
-from ...foundation.quantity import Quantity, quantity
+from ...foundation.quantity import MM, Quantity, quantity
 from ..curves.numbers import in_si, plain
 from ..statics.contour import Contour
 from .arc_path import ArcPath
@@ -23,7 +23,7 @@ from .cam_outline import (
     one_sided_outline,
     two_sided_outlines,
 )
-from .cam_part import CamPart, Hole, check_machinable
+from .cam_part import KEYS, CamPart, Hole, Key, check_machinable
 
 _CLEARANCE = quantity(0.1, "mm", source="assumed: a braided cable of this size passes a gap so much wider")
 _OVER_TRAVEL = quantity(10.0, "deg", source="assumed: room for a stop behind the last angle")
@@ -187,6 +187,8 @@ class MachinedCam(ABC):
         The lips are backed by material to at least this distance from the axis.
     hub_bore
         Diameter of a bore on the axis.
+    keyway
+        Whether the bore has the keyway of its parallel key, DIN 6885-1; it points to y, across the cable.
     bolts
         Bolt holes.
 
@@ -196,6 +198,8 @@ class MachinedCam(ABC):
         If a number lies outside its range, which mostly means a slip of units.
     UnitError
         If a unit measures something else.
+    ArrangementError
+        If there is a keyway without a bore.
     """
 
     thickness: Quantity | float | None = None
@@ -206,10 +210,31 @@ class MachinedCam(ABC):
     edge_tolerance: Quantity | float = _TOLERANCE
     body_radius: Quantity | float | None = None
     hub_bore: Quantity | float | None = None
+    keyway: bool = False
     bolts: BoltCircle | None = None
 
     def __post_init__(self) -> None:
         _check(self)
+        if not isinstance(self.keyway, bool):
+            raise ValueRangeError(
+                f"keyway = {self.keyway!r}", "is neither true nor false: its sizes follow from the bore",
+                next_step="write keyway = true",
+            )  # fmt: skip
+        if self.keyway and self.hub_bore is None:
+            raise ArrangementError("keyway", "has no bore", next_step='give one too, hub_bore = "8 mm"')
+        if self.keyway and self.key is None:
+            raise ValueRangeError(
+                f"hub_bore {self.hub_bore} with a keyway",
+                f"no key is made for it; bores are over {KEYS[0].above:g} and up to {KEYS[-1].up_to:g} mm "
+                "(DIN 6885-1)",
+                next_step="take such a bore, or leave keyway out and take bolts",
+            )
+
+    @property
+    def key(self) -> Key | None:
+        """The key of the bore, where it has a keyway."""
+        bore = MM * plain(self.hub_bore) if self.keyway and self.hub_bore is not None else 0.0
+        return next((key for key in KEYS if key.above < bore <= key.up_to), None)
 
     @property
     def milled(self) -> bool:
@@ -229,7 +254,18 @@ class MachinedCam(ABC):
                 "bolt_circle": as_quantity(self.bolts.circle),
                 "bolt_hole": as_quantity(self.bolts.hole),
             }
+        if self.key is not None:
+            numbers |= {
+                "keyway_width": quantity(self.key.width, "mm", source="DIN 6885-1"),
+                "keyway_depth": quantity(self.key.depth, "mm", source="DIN 6885-1"),
+            }
         return numbers
+
+    def bore(self, *, base_only: bool = False) -> list[Hole]:
+        """Return the bore on the axis, or nothing."""
+        if self.hub_bore is None:
+            return []
+        return [Hole("hub bore", np.zeros(2), plain(self.hub_bore), base_only, self.key)]
 
     def part(self, contour: Contour, *, back: Contour | None = None) -> CamPart:
         """Return the cam as it is made, checked.
@@ -276,7 +312,7 @@ class MachinedCam(ABC):
         base = 0.0
         if self.milled:
             rims = [float(np.hypot(*outline.polygon().T).max()) for outline in outlines]
-            rims += [math.hypot(*hole.centre) + hole.diameter / 2 for hole in holes]
+            rims += [math.hypot(*hole.centre) + hole.reach for hole in holes]
             base = math.ceil(1e4 * (max(rims) + numbers["minimum_wall"].number)) * 1e-4
             numbers["base_radius"] = derived_size(base, "lips, holes and the least wall around them")
         line = contour.centre_line
@@ -298,8 +334,7 @@ class MachinedCam(ABC):
         needed = 0.0
         if self.bolts is not None and not self.milled:
             needed = (plain(self.bolts.circle) + plain(self.bolts.hole)) / 2 + plain(self.minimum_wall)
-        if self.hub_bore is not None:
-            needed = max(needed, plain(self.hub_bore) / 2 + plain(self.minimum_wall))
+        needed = max([needed, *(bore.reach + plain(self.minimum_wall) for bore in self.bore())])
         size = max(0.0, min(limit, max(needed, limit / 2)))
         numbers.setdefault(
             "body_radius", derived_size(size, "what the holes need, at least half of what fits")
@@ -421,14 +456,12 @@ class MachinedTwoSidedCam(MachinedCableCam):
         numbers["channel_length"] = derived_size(mouths, "between the mouths")
         self._body_radius(min(lip.last_support for lip in lips), numbers)
         outlines = list(two_sided_outlines(lips, numbers))
-        holes = []
-        if self.hub_bore is not None:
-            holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore), base_only=True))
+        holes = self.bore(base_only=True)
         if isinstance(self.cable_end, ClampScrew):
             size = plain(self.cable_end.diameter)
             away = numbers["channel_width"].number / 2 + plain(self.minimum_wall) + size / 2
             # Beside the bore in the base, which lies under them.
-            aside = plain(self.hub_bore) / 2 + plain(self.minimum_wall) + size / 2 if self.hub_bore else 0.0
+            aside = holes[0].reach + plain(self.minimum_wall) + size / 2 if holes else 0.0
             holes += [Hole("clamp hole", side * np.array([-aside, away]), size) for side in (-1.0, 1.0)]
         reach = max(float(each.radii.max()) for each in contours)
         halves = [_cable(each, float(each.angles[-1]), 0.35 * reach) for each in contours]
@@ -474,13 +507,9 @@ class MachinedOneSidedCam(MachinedCableCam):
         outline = one_sided_outline(lip, numbers)
         phi, lead = float(contour.directions[0]), numbers["lead_in"].number
         along, normal = np.array([math.cos(phi), -math.sin(phi)]), np.array([math.sin(phi), math.cos(phi)])
-        holes = []
-        if self.hub_bore is not None:
-            bore = plain(self.hub_bore)
-            fits = bore / 2 + wall <= numbers["body_radius"].number
-            holes.append(
-                Hole("hub bore", np.zeros(2), bore, base_only=self.groove_depth is not None and not fits)
-            )
+        holes = self.bore()
+        if holes and self.groove_depth is not None and holes[0].reach + wall > numbers["body_radius"].number:
+            holes = self.bore(base_only=True)
         start = contour.points[0] - lead * along
         if isinstance(self.cable_end, ClampScrew):
             size = plain(self.cable_end.diameter)

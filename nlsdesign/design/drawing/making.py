@@ -11,7 +11,7 @@ from ...foundation.errors import NlsError
 from ...foundation.quantity import MM
 from ..curves.numbers import plain
 from ..statics.contour import Contour
-from .cam_part import CamPart
+from .cam_part import CamPart, Key
 from .machined_cam import BoltCircle, ClampScrew, MachinedCam, MachinedOneSidedCam
 
 _DEEPEST = 4.0
@@ -55,29 +55,6 @@ _SCREWS = (
 )
 
 
-class _Key(NamedTuple):
-    """A parallel key in mm: bores above and up to, sides, depth in the hub, height that presses it.
-
-    Source: DIN 6885-1.
-    """
-
-    above: float
-    up_to: float
-    sides: str
-    depth: float
-    height: float
-
-
-_KEYS = (
-    _Key(6.0, 8.0, "2 x 2", 1.0, 0.8),
-    _Key(8.0, 10.0, "3 x 3", 1.4, 1.2),
-    _Key(10.0, 12.0, "4 x 4", 1.8, 1.5),
-    _Key(12.0, 17.0, "5 x 5", 2.3, 2.0),
-    _Key(17.0, 22.0, "6 x 6", 2.8, 2.5),
-    _Key(22.0, 30.0, "8 x 7", 3.3, 3.0),
-)
-
-
 class BoltLoad(NamedTuple):
     """The bolts of a part under the factor times a torque: the thickest that pass, and the shear of each."""
 
@@ -106,9 +83,51 @@ def bolt_load(part: CamPart, torque: float) -> BoltLoad | None:
     return BoltLoad(count, screw, _FACTOR * torque / (count * part.number("bolt_circle") / 2.0))
 
 
+class KeyLoad(NamedTuple):
+    """A key under the factor times a torque: what it is pressed over, and what plate and shaft need."""
+
+    key: Key
+    length: float  # in mm
+    # plate, shaft: least yield strength in Pa, against pressure, and of a solid shaft in torsion
+    plate: float
+    shaft: float
+
+    @property
+    def carried(self) -> bool:
+        """Whether a usual plate and a usual shaft bear it."""
+        return max(self.plate, self.shaft) <= _YIELD
+
+    def __str__(self) -> str:
+        return (
+            f"a key of {self.key} over {self.length:.3g} mm, with a yield strength of at least "
+            f"{1e-6 * self.plate:.3g} MPa of the plate (DIN 6892 C) and {1e-6 * self.shaft:.3g} MPa of "
+            "a solid shaft (torsion beside its keyway)"
+        )
+
+
+def key_load(part: CamPart, torque: float) -> KeyLoad | None:
+    """Return the load of the key of a part under a torque in N·m; ``None`` where it has none."""
+    bore = next((hole for hole in part.holes if hole.key is not None), None)
+    if bore is None or bore.key is None:
+        return None
+    key, size, length = bore.key, MM * bore.diameter, MM * part.number("thickness")
+    if bore.base_only:
+        length -= MM * part.number("groove_depth")
+    pressure = 1e6 * _FACTOR * 2e3 * torque / (size * key.pressed * length)
+    # Round what is left beside the keyway of the shaft; its yield in shear is 1/√3 of that in tension.
+    core = (size - (key.height - key.pressed)) / MM
+    shear = 16.0 * _FACTOR * torque / (math.pi * core**3)
+    return KeyLoad(key, length, pressure / _PRESSED, math.sqrt(3.0) * shear)
+
+
 def carrying_note(part: CamPart, torque: float) -> str:
     """Return in words what carries a torque in N·m from a part to its shaft; zero where it is not known."""
-    load = bolt_load(part, torque)
+    load, keyed = bolt_load(part, torque), key_load(part, torque)
+    if load is None and keyed is not None:
+        if not torque:
+            return f"A key of {keyed.key} carries the torque."
+        verb = "carries" if keyed.carried else "DOES NOT CARRY"
+        return f"The key {verb} {_FACTOR:g} times {torque:.3g} N·m: {keyed}."
     if load is None:
         what = f" of {torque:.3g} N·m" if torque else ""
         return f"Nothing drawn here carries the torque{what}: no bolts, key or clamp."
@@ -160,6 +179,10 @@ class Mounting:
                     f"{load.bolts} bolts take {_FACTOR:g} times {self.torque:.3g} N·m with {load}"
                     f"{self.bolts_that_do()}"
                 )
+            return
+        keyed = key_load(self.part, self.torque)
+        if keyed is not None:
+            yield carrying_note(self.part, self.torque) + ("" if keyed.carried else self.bolts_that_do())
             return
         bore = "neither bore, bolts, key nor clamp"
         if self.machined.hub_bore is not None:
@@ -233,16 +256,12 @@ class Mounting:
 
     def key_that_does(self) -> str:
         """Return the key of the bore where it fits and a hub bears it, with its strength; else what to do."""
-        bore = 0.0 if self.machined.hub_bore is None else MM * self.part.number("hub_bore")
-        key = next((each for each in _KEYS if each.above < bore <= each.up_to), None)
-        if key is not None and self.fits(hub_bore=(bore + 2.0 * key.depth) / MM):
-            length = MM * self.part.number("thickness")
-            if any(hole.name == "hub bore" and hole.base_only for hole in self.part.holes):
-                length -= MM * self.part.number("groove_depth")
-            needed = 1e6 * _FACTOR * 2e3 * self.torque / (bore * key.height * length) / _PRESSED
-            if needed <= _YIELD:
-                return (
-                    f"a key of {key.sides} mm (DIN 6885-1) over {length:.3g} mm does, in a plate whose yield "
-                    f"strength is at least {1e-6 * needed:.3g} MPa (DIN 6892 C)"
-                )
+        if self.machined.keyway:
+            return "take a larger bore or a thicker plate"
+        try:
+            keyed = key_load(replace(self.machined, keyway=True).part(self.contour), self.torque)
+        except NlsError:
+            keyed = None
+        if keyed is not None and keyed.carried:
+            return f"keyway = true does: {keyed}"
         return "leave room for a key or a clamp, or take a larger body_radius"

@@ -35,16 +35,13 @@ class MachinedRollingCam(MachinedCam):
         """Return the piece, with the way of the centre of what rolls, and lines to it at both ends."""
         self._body_radius(min(lip.last_support, float(made.radii.min())), numbers)
         outline = joined(lip.path, back_of((lip, lip), numbers), lip.path.mirrored(), closed=True)
-        holes = []
-        if self.hub_bore is not None:
-            holes.append(Hole("hub bore", np.zeros(2), plain(self.hub_bore)))
         way = np.vstack([made.centre_line[:0:-1] * [-1.0, 1.0], made.centre_line])
         last = made.centre_line[-1]
         lines = [
             way,
             *(np.array([[0.0, 0.0], end]) for end in (made.centre_line[0], last, last * [-1.0, 1.0])),
         ]
-        return DrawnCam([outline], holes, [ArcPath(points, np.zeros(len(points))) for points in lines])
+        return DrawnCam([outline], self.bore(), [ArcPath(points, np.zeros(len(points))) for points in lines])
 
 
 @dataclass(frozen=True, kw_only=True)

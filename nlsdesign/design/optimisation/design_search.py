@@ -207,7 +207,7 @@ def carried_over(source: Search, point: Array, into: Search) -> Array:
     return into.problem.completed(source.problem.chosen(point))
 
 
-_BATCH = 6
+FIRST_STARTS = 6
 """Starts before it is asked whether the best was found twice."""
 _ENOUGH = 2
 _WIDER = (10.0, 7.5, 5.6, 4.2, 3.2, 2.4, 1.8, 1.35)
@@ -241,6 +241,7 @@ class SeveralStarts:
     """A search from several starts."""
 
     search: Search  # that is to be solved
+    least: int = 1  # starts, also where the settings have fewer
 
     @cached_property
     def rounded(self) -> Program | None:
@@ -258,7 +259,7 @@ class SeveralStarts:
         ends: dict[int, Solution] = {}
         outcomes: list[Solution] = []
         while len(outcomes) < len(self._starts):
-            batch = range(len(first), min(len(first) + _BATCH, len(self._starts)))
+            batch = range(len(first), min(len(first) + FIRST_STARTS, len(self._starts)))
             for solution in self._mapped(self.first, batch):
                 first.append(solution)
                 settings.progress()
@@ -279,7 +280,7 @@ class SeveralStarts:
     def _starts(self) -> list[Start]:
         settings, problem = self.search.question.settings, self.search.problem
         sizes = [v.name for v in problem.scalars if v.name != problem.law.cam.pretension]
-        return list(starts(settings.starts, settings.seed, sizes))
+        return list(starts(max(self.least, settings.starts), settings.seed, sizes))
 
     def _mapped(self, work: Callable[[int], Solution], numbers: Sequence[int]) -> Iterator[Solution]:
         return parallel_map(lambda place: work(numbers[place]), len(numbers))

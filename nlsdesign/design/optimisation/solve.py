@@ -22,7 +22,7 @@ from ..statics.declared_cam import both_sides, one_side, with_contour
 from ..statics.equilibrium import elastic_law, with_smooth_cables
 from .coil_limits import MaximumTravel
 from .defaults import DesignSettings, no_progress, safe_limits, with_defaults
-from .design_search import Question, SeveralStarts
+from .design_search import FIRST_STARTS, Question, SeveralStarts
 from .finish import SolvedSearch, finished, narrowed
 from .goals import Goal, LeastRubber, SmoothContour, TorqueError
 from .limits import Limit
@@ -163,6 +163,9 @@ class Wanted:
         if not any(outcome.solved for outcome in outcomes):
             # Whether there is any cam at all is found out with softened limits.
             outcomes.append(search.program.solve(feasible_point(search, free)))
+        if settings.starts < FIRST_STARTS and not any(outcome.solved for outcome in outcomes):
+            # The limits agree, so few starts were unlucky.
+            outcomes = SeveralStarts(search, FIRST_STARTS).outcomes()
         solved = [i for i, outcome in enumerate(outcomes) if outcome.solved]
         if not solved:
             raise ConvergenceError(

@@ -184,11 +184,13 @@ def _main_view(page: Sheet, view: _View) -> None:
     for outline in view.outlines:
         page.area(view.at(outline), facecolor=GRID.light)
     for hole in part.holes:
-        _circle(
-            page, view.at(hole.centre), view.scale * MM * hole.diameter / 2,
-            linewidth=THIN if hole.base_only else THICK, linestyle=(0, (3, 2)) if hole.base_only else "-",
-            facecolor="none" if hole.base_only else SURFACE.light,
-        )  # fmt: skip
+        look: dict[str, Any] = {"linewidth": THICK, "linestyle": "-", "facecolor": SURFACE.light}
+        if hole.base_only:
+            look = {"linewidth": THIN, "linestyle": (0, (3, 2)), "facecolor": "none"}
+        if hole.outline is not None:
+            page.area(view.at(hole.outline.polygon(2e-6)), **look)
+        else:
+            _circle(page, view.at(hole.centre), view.scale * MM * hole.diameter / 2, **look)
         centre = view.at(hole.centre)
         reach = view.scale * MM * hole.diameter / 2 + 1.2
         for step in (np.array([reach, 0.0]), np.array([0.0, reach])):
@@ -262,6 +264,9 @@ def _named_holes(page: Sheet, view: _View) -> None:
             hole = min(these, key=lambda hole: float(hole.centre[0]))
             count = f"{len(these)} × " if len(these) > 1 else ""
             where = ", base only" if hole.base_only else ""
+            if hole.key is not None:
+                across = _length(hole.diameter / 2 + hole.reach)
+                where += f", keyway {hole.key.width:g} JS9, {across} across"
             named.append((hole.centre, hole.diameter, f"{count}Ø{_length(hole.diameter)} {text}{where}"))
     if part.base_radius:
         named.append((np.zeros(2), 2 * part.base_radius, f"Ø{_length(2 * part.base_radius)} base"))

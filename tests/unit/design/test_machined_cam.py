@@ -35,7 +35,7 @@ from nlsdesign.foundation.errors import (
     ValueRangeError,
 )
 from nlsdesign.foundation.quantity import quantity
-from tests.dxf_reading import entities_of, header_of, polylines_of
+from tests.dxf_reading import entities_of, header_of, offset_points, polylines_of
 
 
 def mm(value: float) -> object:
@@ -124,6 +124,34 @@ def test_dxf_holds_closed_edges_of_arcs_holes_and_layers(tmp_path: Path, contour
     assert sum(row[3] == pytest.approx(0.6) for row in circles) == 2
     assert {item.layer for item in entities} == {"EDGE", "BASE", "HOLES", "CENTRE", "CABLE", "TEXT"}
     assert any("design 0123abcd" in value for item in entities for value in item.values.get(1, []))
+
+
+@pytest.mark.parametrize("base_only", [False, True])
+def test_a_bore_with_a_keyway_is_drawn_as_its_standard_says(tmp_path: Path, base_only: bool) -> None:
+    """DIN 6885-1 for 9 mm: 3 wide, 10.4 from the far side of the bore; the area by an integral by hand."""
+    angles = np.linspace(0.0, 1.2, 100)
+    contour = contour_from_lever_arm(angles, 7e-3 + 3e-3 * angles**2, anchor_distance=math.inf)
+    groove = mm(1.5) if base_only else None
+    wall = mm(2.0) if base_only else mm(0.5)
+    machined = MachinedOneSidedCam(
+        cable_radius=CABLE, hub_bore=mm(9), keyway=True, groove_depth=groove, minimum_wall=wall
+    )
+    part = machined.part(contour)
+    assert part.holes[0].base_only is base_only
+    files = {file.suffix: file for file in write_drawings(tmp_path, contour, machined=machined)}
+    (hole,) = polylines_of(files[".dxf"].read_text(encoding="ascii"), "HOLES")
+    edge = offset_points(hole, 0.0)
+    assert (edge[:, 1].min(), edge[:, 1].max()) == pytest.approx((-4.5, 5.9), abs=1e-5)
+    top = edge[edge[:, 1] > 5.0]
+    assert (top[:, 0].min(), top[:, 0].max()) == pytest.approx((-1.5, 1.5), abs=1e-6)
+    x, y = edge.T
+    area = abs(np.sum(x * np.roll(y, -1) - y * np.roll(x, -1))) / 2
+    cap = 1.5 * math.sqrt(4.5**2 - 1.5**2) + 4.5**2 * math.asin(1.5 / 4.5)
+    assert area == pytest.approx(math.pi * 4.5**2 + 3 * 5.9 - cap, rel=1e-5)
+    table = (tmp_path / "cam.csv").read_text(encoding="utf-8").splitlines()
+    rows = [line for line in table if line.startswith("hub bore,")]
+    assert len(rows) == 5, "three lines and two arcs"
+    assert "L -1.50000 5.90000" in files[".svg"].read_text(encoding="utf-8")
 
 
 def test_the_writer_s_own_audit_finds_no_error(tmp_path: Path, contour: Contour) -> None:
@@ -222,6 +250,26 @@ def test_step_holds_the_solids_in_millimetres(tmp_path: Path, contour: Contour) 
     assert again.read_text(encoding="ascii") == text
 
 
+def test_the_solid_lacks_bore_and_keyway_over_the_plate(tmp_path: Path) -> None:
+    """The volume taken is that of the closed edge on the layer HOLES times the plate."""
+    pytest.importorskip("OCP", reason="STEP is an extra")
+    from OCP.BRepGProp import BRepGProp
+    from OCP.GProp import GProp_GProps
+
+    from nlsdesign.design.drawing.cam_drawing import _solid
+
+    angles = np.linspace(0.0, 1.2, 100)
+    contour = contour_from_lever_arm(angles, 12e-3 + 3e-3 * angles**2, anchor_distance=math.inf)
+    keyed = MachinedOneSidedCam(cable_radius=CABLE, hub_bore=mm(9), keyway=True, body_radius=mm(7))
+    volumes = []
+    for machined in (replace(keyed, hub_bore=None, keyway=False), keyed):
+        properties = GProp_GProps()
+        BRepGProp.VolumeProperties_s(_solid(machined.part(contour)), properties)
+        volumes.append(properties.Mass())
+    cap = 1.5 * math.sqrt(4.5**2 - 1.5**2) + 4.5**2 * math.asin(1.5 / 4.5)
+    assert volumes[0] - volumes[1] == pytest.approx(4 * (math.pi * 4.5**2 + 3 * 5.9 - cap), rel=1e-6)
+
+
 def test_step_without_its_library_says_how_to_get_it(
     tmp_path: Path, contour: Contour, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -301,6 +349,23 @@ REFUSED: dict[str, tuple[type[NlsError], str, Making]] = {
     "bore": (
         ArrangementError, "hub bore of 4 mm: would cut the channel.*give a groove_depth",
         lambda two, one: MachinedTwoSidedCam(cable_radius=CABLE, hub_bore=mm(4)).part(two),
+    ),
+    "keyway without a bore": (
+        ArrangementError, "keyway: has no bore", lambda two, one: MachinedTwoSidedCam(
+            cable_radius=CABLE, keyway=True
+        ),
+    ),
+    "keyway of a small bore": (
+        ValueRangeError, r"hub_bore 6 mm with a keyway: no key is made for it; bores are over 6 and up to 30",
+        lambda two, one: MachinedOneSidedCam(cable_radius=CABLE, hub_bore=mm(6), keyway=True),
+    ),
+    "keyway that is no choice": (
+        ValueRangeError, "keyway = '2 mm': is neither true nor false",
+        lambda two, one: MachinedOneSidedCam(cable_radius=CABLE, hub_bore=mm(8), keyway="2 mm"),
+    ),
+    "keyway in a thin wall": (
+        ValueRangeError, "hub bore of 9 mm with a keyway 1.4 mm deep at 0 mm from the axis: leaves",
+        lambda two, one: MachinedOneSidedCam(cable_radius=CABLE, hub_bore=mm(9), keyway=True).part(one),
     ),
     "bore of a one-sided": (
         ValueRangeError, "hub bore of 11 mm at 0 mm from the axis: leaves",

@@ -131,13 +131,29 @@ def test_where_no_bolts_fit_the_key_of_the_bore_is_named_with_the_strength_it_as
     """2·2·5 N·m on 9 mm are 2222 N, on 1.2 mm by 4 mm 463 MPa, which is 0.9 of 514 MPa."""
     machined, contour = wound(hub_bore=9e-3, thickness=4e-3, minimum_wall=5e-3)
     (said,) = remarks(machined, contour, 5.0)
-    assert "no bolts that carry it fit: a key of 3 x 3 mm (DIN 6885-1) over 4 mm does" in said
+    assert "no bolts that carry it fit: keyway = true does: a key of 3 x 3 mm (DIN 6885-1) over 4 mm" in said
     assert "at least 514 MPa" in said
     (said,) = remarks(machined, contour, 10.0)
     assert said.endswith("leave room for a key or a clamp, or take a larger body_radius"), "no steel bears it"
     wide = replace(machined, hub_bore=quantity(16.0, "mm"))
     (said,) = remarks(wide, contour, 5.0)
     assert "a key of" not in said, "no wall is left beside it"
+
+
+def test_a_keyway_carries_the_torque_or_says_what_it_lacks() -> None:
+    """The shaft of 9 mm is 7.2 mm beside its keyway: 16·10 N·m/(π·7.2³) are 136 MPa, √3 times 236 MPa."""
+    machined, contour = wound(hub_bore=9e-3, keyway=True, thickness=4e-3)
+    (said,) = remarks(machined, contour, 5.0)
+    assert said.startswith("The key carries 2 times 5 N·m: a key of 3 x 3 mm (DIN 6885-1) over 4 mm")
+    assert "at least 514 MPa of the plate (DIN 6892 C) and 236 MPa of a solid shaft" in said
+    assert said == carrying_note(machined.part(contour), 5.0)
+    assert carrying_note(machined.part(contour), 0.0) == "A key of 3 x 3 mm (DIN 6885-1) carries the torque."
+    (said,) = remarks(machined, contour, 10.0)
+    assert said.startswith("The key DOES NOT CARRY 2 times 10 N·m")
+    assert "bolts = {" in said, "what would"
+    tight = replace(machined, minimum_wall=quantity(4.5, "mm"))
+    (said,) = remarks(tight, contour, 10.0)
+    assert said.endswith("no bolts that carry it fit: take a larger bore or a thicker plate")
 
 
 def test_the_sheet_says_what_carries_the_torque(contour: Contour) -> None:

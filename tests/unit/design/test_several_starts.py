@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import pytest
 from benchmarks.cam_design import Problem, problems, random_point
 from nlsdesign.design import DesignSettings, design_cam
 from nlsdesign.design.optimisation.design_search import SeveralStarts, same_design, times_found
-from nlsdesign.design.optimisation.program import Solution
+from nlsdesign.design.optimisation.program import Program, Solution
 from nlsdesign.design.optimisation.shape import starts
 from tests.cam_cases import CONCAVE, KEEP, PRETENSION, TARGET, actuator
 
@@ -60,6 +61,27 @@ def test_two_shapes_of_one_cost_are_two_designs() -> None:
     assert not any(same_design(problem, one, other) for other in (wider, dearer, failed))
     assert times_found(problem, [dearer, near, one, wider, failed]) == 2
     assert times_found(problem, [failed]) == 0
+
+
+@pytest.mark.slow
+def test_where_the_only_start_fails_more_are_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whether one start comes through differs from processor to processor."""
+    solve, tried = Program.solve, []
+
+    def unlucky(program: Program, *given: Any, **more: Any) -> Solution:
+        tried.append(1)
+        outcome = solve(program, *given, **more)
+        return replace(outcome, solved=outcome.solved and len(tried) > 2)
+
+    monkeypatch.setattr(Program, "solve", unlucky)
+    monkeypatch.setattr(
+        "nlsdesign.design.optimisation.solve.feasible_point",
+        lambda search, _: search.problem.at(next(starts(1, 0, []))),
+    )
+    few = DesignSettings(starts=1, look_for_size_ranges=False, look_for_remedies=False, draws=0)
+    design = design_cam(actuator(CONCAVE), target=TARGET, free=PRETENSION, keep=KEEP, settings=few)
+    assert design.met
+    assert len(design.starts) == 6
 
 
 @pytest.mark.slow

@@ -21,7 +21,7 @@ from nlsdesign.foundation.quantity import parse_unit
 from nlsdesign.foundation.text_files import text_of, write_text
 from tests.command_line import Run, run
 from tests.fuzz.commands import STUDIES
-from tests.fuzz.records import _RIG
+from tests.fuzz.records import _RIG, Records
 
 __all__ = ["run"]
 NUMBER = '[motor]\ncomponent = "Inertia"\ninertia = {{value = {}, unit = "{}", source = "x", spread = {}}}\n'
@@ -103,6 +103,14 @@ def test_file_of_a_rig(name: str, tmp_path: Path) -> None:
     text, rule = RIGS[name]
     (tmp_path / "rig.toml").write_text(text, encoding="utf8")
     with pytest.raises(NlsError, match=rule):
+        bundled("models", "test_rig").test_rig_deck(tmp_path / "rig.toml", tmp_path / "cam.csv")
+
+
+def test_a_rig_whose_rubber_has_no_length(tmp_path: Path) -> None:
+    (case,) = (case for case in Records().undamaged() if case.how == "rig")
+    case.written(tmp_path)
+    write_text(tmp_path / "rig.toml", _RIG.replace("L0_m = 0.0125", "L0_m = 0"))
+    with pytest.raises(NlsError, match=r"rig\.toml: rubber\.L0_m: 0 m is no length"):
         bundled("models", "test_rig").test_rig_deck(tmp_path / "rig.toml", tmp_path / "cam.csv")
 
 

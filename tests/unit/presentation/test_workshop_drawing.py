@@ -71,8 +71,15 @@ def one_sided(last: float = 1.2) -> CamPart:
     return MachinedOneSidedCam(cable_radius=CABLE, hub_bore=4e-3).part(contour)
 
 
+def keyed() -> CamPart:
+    angles = np.linspace(0.0, 1.2, 100)
+    contour = contour_from_lever_arm(angles, 12e-3 + 3e-3 * angles**2, anchor_distance=math.inf)
+    return MachinedOneSidedCam(cable_radius=CABLE, hub_bore=9e-3, keyway=True).part(contour)
+
+
 PARTS = {
     "two-sided": two_sided(),
+    "keyed": keyed(),
     "groove": two_sided(groove=True),
     "one-sided": one_sided(),
     "wound": one_sided(3.5),
@@ -126,6 +133,7 @@ def test_the_page_says_what_the_workshop_needs(name: str, tmp_path: Path) -> Non
         "two-sided": ["0.5 at the mouth", "0.6 inside", "4 × Ø1.6 through, on Ø13"],
         "groove": ["Ø3 hub bore, base only", "2 × Ø1 for the clamp", "1.5"],
         "one-sided": ["Ø4 hub bore", "Lead-in"],
+        "keyed": ["Ø9 hub bore, keyway 3 JS9, 10.4 across"],
         "long": ["Ferrule seat *", "5:1, A4, mm"],
         "wound": ["contact at 200.5°,", "then run-out 10°"],
     }

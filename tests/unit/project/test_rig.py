@@ -16,7 +16,7 @@ from scipy.signal import lfilter
 
 from tests.rig import ACTUATORS, Hidden, truth, with_slack_cable
 from tests.rig.actuators import Actuator
-from tests.rig.bench import History, Servo, simulate
+from tests.rig.bench import CAM_END, History, Servo, simulate
 from tests.rig.commands import HOLD_TIME, STEP, Command, hold, sines
 from tests.rig.effects import scale_of
 from tests.rig.rubber import pull_of, slider_set
@@ -300,6 +300,18 @@ def test_backlash_of_no_width_is_a_rigid_gear(actuator: Actuator) -> None:
     rigid, tight = run(actuator, command, friction=level), run(actuator, command, friction=level, gap=1e-9)
     np.testing.assert_allclose(tight.motor_angle, rigid.motor_angle, atol=1e-6)
     np.testing.assert_allclose(tight.force, rigid.force, atol=1e-2)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02])
+def test_a_machine_that_runs_away_is_held_at_the_end_of_its_cam(actuator: Actuator, gap: float) -> None:
+    time = np.arange(round(0.6 / STEP)) * STEP
+    still, turned = Command(time, np.zeros_like(time), np.zeros_like(time)), 0.3
+    servo = Servo.for_actuator(actuator)
+    history = simulate(actuator, Hidden(gap=gap), servo, still, lambda t, _: 12.0 if t < turned else -12.0)
+    angle = history.cam_angle
+    assert np.abs(angle).max() == CAM_END == angle[round(turned / STEP)] == -angle[-1]
+    assert (angle[round(turned / STEP) + 1 :] < CAM_END).all()  # it comes off at once
+    assert history.motor_speed[round(turned / STEP)] == 0.0
 
 
 @pytest.mark.long_cases("wrist")

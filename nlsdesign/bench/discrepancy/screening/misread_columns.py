@@ -1,4 +1,6 @@
-"""Columns that hold something else than is stated, asked where no effect explains what is left.
+"""Columns that hold something else than is stated.
+
+They are asked about before any effect where nearly nothing is explained, else where no effect explains it.
 
 An angle in degrees under a head in radians, the angle of a rotor where that of its joint is meant, two
 columns exchanged, a current that acts a sample later than is declared: no effect undoes any of them, and each
@@ -38,15 +40,18 @@ class _Reading(NamedTuple):
 
 
 def misread_findings(
-    actuator: Assembly, records: RecordSet, comparison: Comparison, base: Hypothesis
+    actuator: Assembly, records: RecordSet, comparison: Comparison, base: Hypothesis, *, least: float = 0.0
 ) -> list[Finding]:
     """Return the column that, read otherwise, lets the declared model explain nearly all of the error.
 
     ``records``: as measured. ``comparison``, ``base``: of them as they were read, and the declared model.
+    ``least``: share of the effort that this leaves where it is asked at all.
     """
     worst = max(comparison.judged(base), key=lambda judged: float(judged.residual @ judged.residual))
     block = worst.block.name
     before = error_share(comparison, base, block)
+    if before < least:
+        return []
     shares: dict[tuple[str, str], float] = {}
     for reading in _readings(actuator, records):
         # What one record denies need not be asked of all.

@@ -93,12 +93,17 @@ class Acting:
 
     def _outside(self, block: Block) -> tuple[list[str], list[str]]:
         """Return the measured signals that drive the body of a balance, and other measured efforts on it."""
-        moving = {d.signal for d in block.drives.values() if d.order > 0}
-        others = [s for s in dict.fromkeys(d.signal for d in block.drives.values()) if s not in moving]
+        symbols, drives = block.model.symbols(), block.drives
+        acts = ca.which_depends(symbols.output, symbols.input, 1, False)
+        acting = [
+            v.name for v, does in zip(block.model.inputs, acts, strict=True) if does and v.name in drives
+        ]
+        moving = {d.signal for d in drives.values() if d.order > 0}
+        others = [s for s in dict.fromkeys(drives[name].signal for name in acting) if s not in moving]
         bodies = [body for body in self._model.bodies if body.name == block.name]
         own = {name for body in bodies for name in (*body.drives, *body.acting)}
-        drives = [s for s in others if reading_of(self._model.readings, s).measured in own]
-        return drives, [s for s in others if s not in drives]
+        driving = [s for s in others if reading_of(self._model.readings, s).measured in own]
+        return driving, [s for s in others if s not in driving]
 
 
 def _inertial_effort(judged: Judged) -> Array:

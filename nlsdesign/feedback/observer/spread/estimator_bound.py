@@ -60,15 +60,16 @@ def estimator_bound(model: FlatModel, prior: Prior, inputs: Array, sensed: Sense
     begin = np.concatenate([model.start(model.states), np.zeros(len(model.states) * xi)])
     course = step.mapaccum("course", count)(begin, inputs).full()
     course = np.concatenate([begin[:, None], course[:, :-1]], axis=1)
-    if not np.all(np.isfinite(course)):
-        raise ConvergenceError(
-            f"slopes of {model.name} along the run", "are not finite",
-            next_step="use more substeps per sample",
-        )  # fmt: skip
     seen, wanted = read.map(count)(course, inputs)
     h, g = seen.full().T, wanted.full().T
     variance, before = np.zeros(count), np.einsum("ti,ti->t", g, g)
     covariance, noise = np.eye(xi), sensed.quantum**2 / 12.0
+    # Of an unstable motion the slopes grow without end: beside them the prior is lost in a double.
+    if not (np.all(np.isfinite(course)) and np.max(np.square(h)) < noise / np.finfo(float).eps):
+        raise ConvergenceError(
+            f"motion of {model.name} along the run", "is not decided by its inputs to first order",
+            next_step="use a smaller torque or lower frequencies in the duty",
+        )  # fmt: skip
     for k in range(count):
         # J⁻¹ with one more reading, by Sherman and Morrison.
         gained = covariance @ h[k]

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 from nlsdesign.bench.discrepancy import Verdict, diagnose
+from nlsdesign.bench.discrepancy.effects import Candidate
+from nlsdesign.bench.discrepancy.effects.effect import EffectFunction
 from nlsdesign.bench.identification import load_records
+from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.model import flatten
@@ -33,41 +37,74 @@ def held_from_the_other_side(mapping: str) -> str:
     return mapping.replace('"held"', '"held_before"')
 
 
-def verdict_of(folder: Path, hidden: tuple[str, ...], change: Callable[[str], str], factor: float) -> Verdict:
-    """Diagnose a geared joint with no effect in the catalogue, its mapping and its angle changed."""
-    write_kind_case(folder, "geared_joint", hidden, 1.0, 1311, says_held=True)
+def none_is_asked_for(actuator: Assembly) -> list[Candidate]:
+    """Stand for a catalogue where a column is asked about before any effect."""
+    raise AssertionError(f"effects are looked for in {actuator.name}")
+
+
+class Dress(NamedTuple):
+    """A wrong way to write records of a machine."""
+
+    kind: str = "geared_joint"
+    mapping: Callable[[str], str] = str  # changes records.toml
+    scaled: str = "angle"
+    factor: float = 1.0  # of the column above
+
+
+def verdict_of(
+    folder: Path, hidden: tuple[str, ...], dress: Dress, catalogue: Sequence[EffectFunction] = ()
+) -> Verdict:
+    """Diagnose a machine whose records are written otherwise than is stated."""
+    write_kind_case(folder, dress.kind, hidden, 1.0, 1311, says_held=True)
     mapping = folder / "records.toml"
-    mapping.write_text(change(mapping.read_text()))
+    mapping.write_text(dress.mapping(mapping.read_text()))
     for file in folder.glob("*.csv"):
         if file.stem not in ONLY:
             file.unlink()
             continue
         head, rows = file.read_text().partition("\n")[0], np.loadtxt(file, delimiter=",", skiprows=1)
-        rows[:, head.split(",").index("angle")] *= factor
+        rows[:, head.split(",").index(dress.scaled)] *= dress.factor
         np.savetxt(file, rows, "%.9g", ",", header=head, comments="")
     rig = declare(load_deck(folder / "deck.toml"))
-    return diagnose(rig, load_records(folder, flatten(rig)), catalogue=())
+    return diagnose(rig, load_records(folder, flatten(rig)), catalogue=catalogue)
 
 
 @pytest.mark.parametrize(
-    ("change", "factor", "column", "words"),
+    ("dress", "column", "words"),
     [
-        (in_another_unit, 1.0, "angle", "read in rad"),
-        (str, 80.0, "angle", "read as the motion before the ratio of motor"),
-        (exchanged, 1.0, "current_A", "read exchanged with 'angle'"),
-        (held_from_the_other_side, 1.0, "current_A", "read as the records show that it runs"),
+        (Dress(mapping=in_another_unit), "angle", "read in rad"),
+        pytest.param(
+            Dress(factor=80.0),
+            "angle",
+            "read as the motion before the ratio of motor",
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            Dress(mapping=exchanged), "current_A", "read exchanged with 'angle'", marks=pytest.mark.slow
+        ),
+        (Dress("belt_axis", scaled="load_angle", factor=180.0 / np.pi), "load_angle", "read in deg"),
     ],
-    ids=["unit", "rotor", "exchanged", "held"],
+    ids=["unit", "rotor", "exchanged", "free load"],
 )
-def test_a_column_that_is_not_what_is_stated_is_suspect(
-    change: Callable[[str], str], factor: float, column: str, words: str, tmp_path: Path
+def test_a_column_of_which_nearly_all_is_wrong_is_suspect_before_effects_are_looked_for(
+    dress: Dress, column: str, words: str, tmp_path: Path
 ) -> None:
-    verdict = verdict_of(tmp_path, (), change, factor)
+    suspected(verdict_of(tmp_path, (), dress, (none_is_asked_for,)), column, words)
+
+
+def test_a_column_that_runs_otherwise_between_its_samples_is_suspect_where_no_effect_explains_it(
+    tmp_path: Path,
+) -> None:
+    verdict = verdict_of(tmp_path, (), Dress(mapping=held_from_the_other_side))
+    suspected(verdict, "current_A", "read as the records show that it runs")
+
+
+def suspected(verdict: Verdict, column: str, words: str) -> None:
     assert verdict.verdict == "data_suspect"
     assert any(f"column '{column}'" in each and words in each for each in verdict.where), verdict.where
 
 
 def test_what_is_missing_in_the_machine_is_no_column(tmp_path: Path) -> None:
-    verdict = verdict_of(tmp_path, ("coulomb_friction",), str, 1.0)
+    verdict = verdict_of(tmp_path, ("coulomb_friction",), Dress())
     assert verdict.verdict == "unknown"
     assert not any("not what is stated" in each for each in verdict.where)

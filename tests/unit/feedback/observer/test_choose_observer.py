@@ -23,9 +23,10 @@ from nlsdesign.feedback.observer import (
     observer_bench,
     observer_errors,
 )
+from nlsdesign.feedback.observer.spread.estimator_bound import SensedTorque, estimator_bound
 from nlsdesign.foundation.deck import load_deck
-from nlsdesign.foundation.errors import ArrangementError, UnknownNameError, ValueRangeError
-from nlsdesign.foundation.quantity import quantity
+from nlsdesign.foundation.errors import ArrangementError, ConvergenceError, UnknownNameError, ValueRangeError
+from nlsdesign.foundation.quantity import quantity, three_digits
 from nlsdesign.foundation.spread import EXACT
 from nlsdesign.model import FlatModel, flatten
 from nlsdesign.simulation.prior import declared_prior
@@ -105,12 +106,28 @@ def test_errors_over_the_spread_are_those_of_their_runs(errors: SpreadErrors) ->
     assert float(errors.quantile("cascade", 0.5)[0]) <= float(errors.quantile("cascade", 0.9)[0])
     with pytest.raises(UnknownNameError):
         errors.quantile("cascad", 0.5)
-    assert "no estimator below" in str(errors)
+    head, row = (line.split("  ") for line in str(errors).splitlines()[1:3])
+    shown = dict(zip(head, row, strict=True))
+    assert shown["exact numbers"] == three_digits(1e3 * errors.exact[0, 0])
+    assert shown["90 %"] == three_digits(1e3 * errors.quantile("corrected", 0.9)[0])
+    assert shown["no estimator below"] == three_digits(1e3 * errors.bound[0])
 
 
 def test_the_bound_lies_below_what_the_deck_alone_says(errors: SpreadErrors) -> None:
     alone = np.log(1.05) * 1.2 / np.sqrt(2.0)
     assert 0.3 * alone < errors.bound[0] < alone
+
+
+def test_where_the_motion_is_unstable_there_is_no_bound(linear: FlatModel) -> None:
+    """A spring that pushes away: slopes grow by e every 2 ms, and their squares leave what a double holds."""
+    turned = {"spring.stiffness": {"minimum": -10.0, "start": -1.7}}
+    unstable = replace(
+        linear, parameters=tuple(replace(v, **turned.get(v.name, {})) for v in linear.parameters)
+    )
+    sensed = SensedTorque("spring.torque", "motor.angle", 0.767e-3)
+    known = declared_prior(linear).only(["spring.stiffness"])
+    with pytest.raises(ConvergenceError, match="not decided by its inputs"):
+        estimator_bound(unstable, known, np.ones((1, 2000)), sensed)
 
 
 def test_the_bound_counts_every_input_of_a_machine() -> None:
