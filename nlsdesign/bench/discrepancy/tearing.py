@@ -69,7 +69,10 @@ def _measured(model: FlatModel, signal: str) -> Measured:
 
 
 def _variable_behind(model: FlatModel, name: str) -> str:
-    """Return the state or input that a signal follows from through a fixed ratio: an angle behind a gear."""
+    """Return the state or input that a signal follows from through a fixed ratio: a motion behind a gear.
+
+    A force that goes with a motion, as that of a spring, is none.
+    """
     s = model.symbols()
     known = {v.name: (v, s.signal[i]) for i, v in enumerate(model.signals)}
     if name not in known:
@@ -78,9 +81,14 @@ def _variable_behind(model: FlatModel, name: str) -> str:
     moving = [(v, s.state[i]) for i, v in enumerate(model.states)]
     moving += [(v, s.input[i]) for i, v in enumerate(model.inputs)]
     inside = [(v, symbol) for v, symbol in moving if ca.depends_on(value, symbol)]
-    if len(inside) != 1 or not same_dimension(inside[0][0].unit, variable.unit):
+    if len(inside) != 1:
         return name
     behind, symbol = inside[0]
+    # Behind a rack or a screw the motion of what is geared has the unit of another domain.
+    units = {b.motion: ("m", "rad") for b in model.bodies if top_part(name) in b.geared}
+    units |= {b.rate: ("m/s", "rad/s") for b in model.bodies if top_part(name) in b.geared}
+    if not any(same_dimension(unit, variable.unit) for unit in (behind.unit, *units.get(behind.name, ()))):
+        return name
     everything = ca.vertcat(s.state, s.input, s.time)
     return name if ca.depends_on(ca.jacobian(value, symbol), everything) else behind.name
 

@@ -78,6 +78,16 @@ GEARED = assembly(
     spring=spring("drum"),
     bearing=damped("drum", 0.03),
 )
+SCREW = assembly(
+    "screw",
+    servo=c.CurrentDrivenMotor(
+        inertia=2e-4, torque_constant=0.3, resistance=1.0, current_limit=99.0, voltage_limit=1e4
+    ),
+    carriage=c.Mass(mass=30.0),
+    screw=c.Screw(between=("servo", "carriage"), lead=0.01),
+    spring=tie(c.Spring(stiffness=Quantity(4e3, "N/m")), "carriage"),
+    guide=tie(c.Dashpot(damping=Quantity(300.0, "N*s/m")), "carriage"),
+)
 
 MACHINES: dict[str, tuple[Assembly, str, float]] = {
     "series": (SERIES, "motor.current", 1.0),
@@ -85,6 +95,7 @@ MACHINES: dict[str, tuple[Assembly, str, float]] = {
     "wound": (WOUND, "motor.wanted_voltage", 2.0),
     "pendulum": (PENDULUM, "arm.torque", 0.5),
     "geared": (GEARED, "rotor.current", 1.0),
+    "screw": (SCREW, "servo.current", 1.0),
 }
 """Machine, what drives it, and how strongly."""
 
@@ -120,6 +131,11 @@ CASES: list[tuple[str, tuple[str, ...], dict[str, str | None]]] = [
     ("geared", ("rotor.angle", "rotor.current"), {"drum": None}),
     ("geared", ("rotor.speed", "rotor.current"), {"drum": None}),
     ("geared", ("drum.angle", "rotor.angle", "rotor.current"), {"drum": None, "rotor.angle": "rotor.angle"}),
+    ("screw", ("carriage.position", "servo.current"), {"servo": None}),
+    ("screw", ("carriage.speed", "servo.current"), {"servo": None}),
+    ("screw", ("servo.angle", "carriage.position", "servo.current"),
+        {"servo": None, "carriage.position": "carriage.position"}),
+    ("screw", ("carriage.position", "spring.force"), {"spring": "spring.force"}),
 ]  # fmt: skip
 
 
