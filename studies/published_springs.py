@@ -53,7 +53,7 @@ from nlsdesign.design import (
 from nlsdesign.foundation.arrays import Array
 from nlsdesign.foundation.text_files import write_text
 from nlsdesign.presentation import figures
-from nlsdesign.presentation.report import Chapter, FigureSection, Section, TableSection
+from nlsdesign.presentation.report import Chapter, FigureSection, FoldedSection, Section, TableSection
 
 POUND, INCH = 4.4482216153, 0.0254
 """N and m."""
@@ -519,10 +519,7 @@ def machine(theirs: Published, last: float, cam: Callable[..., Cam], pretension:
 
 # What is written -----------------------------------------------------------------------------------------
 
-HEADS = (
-    "spring", "theirs: radius, mm", "theirs: force, N", "theirs: follows the curve", "ours",
-    "radius, mm", "force, N", "largest miss, %", "verdict",
-)  # fmt: skip
+HEADS = ("spring", "ours", "radius, mm", "force, N", "largest miss, %", "verdict")
 
 
 def rows_of(results: Results) -> list[tuple[str, ...]]:
@@ -530,12 +527,9 @@ def rows_of(results: Results) -> list[tuple[str, ...]]:
     return [
         (
             ours.published.name,
-            f"{1e3 * ours.published.radius:.1f}",
-            f"{ours.published.force:.1f}",
-            ours.published.follows,
             ours.kind,
-            f"{1e3 * ours.radius:.1f}",
-            f"{ours.force:.1f}",
+            f"{1e3 * ours.published.radius:.1f} → {1e3 * ours.radius:.1f}",
+            f"{ours.published.force:.1f} → {ours.force:.1f}",
             f"{100.0 * ours.largest_miss:.2f}" + ("" if ours.met else ", missed"),
             ours.verdict,
         )
@@ -548,18 +542,17 @@ def write(out: Path, results: Results, *, drawn: bool) -> None:
     rows = rows_of(results)
     lines = [" | ".join(row) for row in (HEADS, *rows)]
     write_text(out / "theirs_ours.txt", "\n".join(lines) + "\n")
-    sections: list[Section] = []
+    folded: dict[Published, list[Section]] = {}
     for ours in results.answers:
-        sections.append(Chapter(f"{ours.published.name}: {ours.kind}", f"Source: {ours.published.source}."))
         for side, design in ours.sides.items():
             name = f"{ours.published.key}_{ours.key}_{side.replace(' ', '_')}"
             nls.write_deck(design.actuator, out / name / "designed.toml")
             if drawn and not ours.as_theirs and side == next(iter(ours.sides)):
                 figures.DesignPictures(deck=ours.published.name).of_design(design, out / name)
             curve = {"ours": (design.check.angles, design.check.torques)}
-            sections.append(
+            folded.setdefault(ours.published, []).append(
                 FigureSection(
-                    f"Torque, {side}",
+                    f"Torque, {ours.kind}, {side}",
                     figures.torque_against_target(design.target, curve),
                     caption=f"Of the finished assembly, whose deck is {name}/designed.toml.",
                 )
@@ -570,11 +563,19 @@ def write(out: Path, results: Results, *, drawn: bool) -> None:
             "Theirs, ours",
             HEADS,
             tuple(rows),
-            caption="Radius: the largest distance of the cam from its centre. Force: the largest of one "
-            "coil. Theirs of ETH and WPI follow from their numbers by the balance of work; radii of Michigan "
-            "are of their published points, their forces follow. Miss: of the largest torque of its side.",
+            caption="Theirs → ours. Radius: the largest distance of the cam from its centre. Force: the "
+            "largest of one coil. Theirs of ETH and WPI follow from their numbers by the balance of work; "
+            "radii of Michigan are of their published points, their forces follow. Miss: of the largest "
+            "torque of its side.",
         ),
-        *sections,
+        *(
+            section
+            for theirs, parts in folded.items()
+            for section in (
+                Chapter(theirs.name, f"Theirs: {theirs.follows}. Source: {theirs.source}."),
+                FoldedSection("Torque of ours over the angle", tuple(parts)),
+            )
+        ),
         title="Springs that others published",
         abstract="Each on its own task: curve, range and coil are theirs. Masses are not compared, for none "
         "gives that of its spring alone; ETH's joint of the hills weighs 27 g with both cams and coils.",

@@ -13,7 +13,7 @@ from .output import examples, show_json
 @click.command(
     epilog=examples(
         "nlsdesign serve",
-        "nlsdesign serve austin2015_soft_spring --no-browser",
+        "nlsdesign serve austin2015_figure_consistent --no-browser",
         "nlsdesign serve my.toml --port 8123 --no-browser --json",
     )
 )

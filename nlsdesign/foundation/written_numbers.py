@@ -24,6 +24,7 @@ _FORMS_OF_HEADS = tuple(
         r"\s+in\s+(?P<unit>\S+)",
         r"\s+/\s*(?P<unit>\S+)",
         r"\s*,\s*(?P<unit>\S+)",
+        r"(?<=[^\s/])/(?P<unit>[^\s/]+)",
     )
 )
 """Forms in which heads of columns give units; what holds no unit belongs to the name."""
@@ -83,16 +84,25 @@ def name_and_unit(head: str) -> tuple[str, str | None]:
     --------
     >>> name_and_unit("force [kN]"), name_and_unit("t_ms"), name_and_unit("Moment in Nm")
     (('force', 'kN'), ('t', 'ms'), ('Moment', 'N*m'))
+    >>> name_and_unit("F/N"), name_and_unit("speed rad/s")
+    (('F', 'N'), ('speed rad/s', None))
     """
     for form in _FORMS_OF_HEADS:
         match = form.match(head)
-        if match is None:
+        if match is None or (form is _FORMS_OF_HEADS[-1] and _is_unit(match["name"].split()[-1])):
             continue
         unit = unit_as_written(match["unit"])
-        with contextlib.suppress(UnitError):
-            parse_unit(unit)
+        if _is_unit(unit):
             return match["name"], unit
     return head, None
+
+
+def _is_unit(text: str) -> bool:
+    """Tell whether a text is a unit."""
+    with contextlib.suppress(UnitError):
+        parse_unit(text)
+        return True
+    return False
 
 
 _PREFIXES = ((1e3, 1e-3, "k"), (1.0, 1.0, ""))

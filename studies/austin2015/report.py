@@ -94,7 +94,8 @@ def answers(results: Results) -> TableSection:
     built, trimmed = (
         f"{numbers[f'design_quantile{when}_mNm_rms']:.0f}" for when in ("", "_after_trim")
     )  # fmt: skip
-    bound = ", ".join(design.limits_reached) or "none"
+    # Without the names of limits in brackets, which nobody needs here.
+    bound = ", ".join(reached.partition(" (")[0] for reached in design.limits_reached) or "none"
     limits = f"every limit is kept; it sits on: {bound}" if design.met else str(design.miss)
     known, followed, margins = [], [], []
     for each in both.values():

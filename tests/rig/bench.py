@@ -10,8 +10,8 @@ finite freedom dynamics),
 
     ω⁺ = prox(ω_free) = sign(ω_free) max(|ω_free| − level Δt/J, 0)
 
-with the step Δt, so a stuck drive has exactly zero speed.  Without backlash both sides are one inertia.  A stop at the
-end of the cam takes all speed.
+with the step Δt, so a stuck drive has exactly zero speed.  Without backlash both sides are one inertia.
+A stop at the end of the cam takes all speed.
 Positions follow with the new speed (leapfrog).
 """
 

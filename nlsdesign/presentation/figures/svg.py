@@ -368,8 +368,8 @@ def _column(values: Any) -> list[float | None]:
     return [float(f"{v:.{_DIGITS}g}") if math.isfinite(v) else None for v in numbers.tolist()]
 
 
-COLUMNS, ROWS = 700, 400
-"""Finest grid that a full-width panel can show on paper and on screen."""
+COLUMNS, ROWS = 400, 400
+"""Grid of a full-width panel whose cells are as fine as its lines are thick, some two pixels of a screen."""
 
 
 def thinned(x: ArrayLike, y: ArrayLike) -> tuple[Array, Array]:

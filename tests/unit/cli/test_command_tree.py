@@ -19,7 +19,10 @@ import pytest
 
 from nlsdesign.cli.main import program
 from nlsdesign.cli.studies import study_names
-from nlsdesign.foundation.deck import deck_names
+from nlsdesign.components import declare
+from nlsdesign.foundation.deck import deck_names, load_deck
+from nlsdesign.model import flatten
+from nlsdesign.model.roles import series_cam
 from tests.command_line import Run, run
 
 __all__ = ["run"]
@@ -105,6 +108,14 @@ QUICK = [
     if words[0] in ("parts", "materials", "completion")
     or words[:2] in (["deck", "list"], ["design", "--list"])
 ]
+
+
+def test_the_deck_in_the_example_of_serve_has_a_cam_to_design() -> None:
+    """The page would begin with another deck."""
+    decks = [words[1] for words in examples_of(WORKING[("serve",)]) if len(words) > 1 and "." not in words[1]]
+    assert decks
+    for deck in decks:
+        assert series_cam(flatten(declare(load_deck(deck)))).name
 
 
 @pytest.mark.parametrize("words", QUICK, ids=" ".join)

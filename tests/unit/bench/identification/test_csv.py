@@ -67,6 +67,7 @@ WRITTEN = {
     "Excel in Europe": ([*with_heads("t [s]", "encoder.reading [°]", "cell.reading [N·m]")], "cp1252"),
     "dates": ([",".join(("timestamp", *HEADS[1:])), *map(dated, PLAIN[1:])], "utf-8"),
     "German heads": ([*with_heads("Zeit in s", "Winkel (°)", "Drehmoment / Nm")], "utf-8"),
+    "symbols over units": ([*with_heads("t/s", "φ/°", "M/Nm")], "utf-8"),
     "a comment between rows": ([*PLAIN[:9], "# a note", "", *PLAIN[9:]], "utf-8"),
 }  # fmt: skip
 
