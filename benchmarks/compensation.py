@@ -173,6 +173,27 @@ def judged_under(
     return row
 
 
+def shown(rows: Mapping[str, Mapping[str, object]]) -> str:
+    """Return all machines as a table, and how many err how much more than one that is told the truth."""
+    lines = [
+        "| machine, hidden effect | named | declared | diagnosed | told |",
+        "| --- | --- | --- | --- | --- |",
+    ]
+    told_ratios, ratios = [], []
+    for name, row in rows.items():
+        actuator, effect, _ = name.split(" ")
+        before, after, true = (float(str(row.get(k, math.nan))) for k in ("before", "after", "told"))
+        named = " and ".join(map(str, np.ravel(row["named"]))) or "nothing"
+        errors = " | ".join("none" if math.isnan(e) else f"{e:.3g}" for e in (before, after, true))
+        lines.append(f"| {actuator}, {effect} | {named} | {errors} |".replace("_", " "))
+        told_ratios.append(after / true)
+        ratios.append(after / before)
+    near, worse = (np.sum(np.array(r) <= most) for r, most in ((told_ratios, 1.1), (ratios, 1.02)))
+    lines.append(f"\n{near} of {len(rows)} err at most 1.1 times as much as one that is told the truth,")
+    lines.append(f"{worse} at most 1.02 times as much as under the declared deck")
+    return "\n".join(lines)
+
+
 def main() -> int:
     """Judge all machines of a seed and print a table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
@@ -192,6 +213,7 @@ def main() -> int:
                 given.out.parent.mkdir(parents=True, exist_ok=True)
                 given.out.write_text(json.dumps(rows, indent=1), "utf-8")
             print(name, {k: v for k, v in rows[name].items() if k != "said"}, flush=True)
+    print(shown(rows))
     return 0
 
 

@@ -15,7 +15,16 @@ import pytest
 
 import nlsdesign as nls
 from benchmarks._default_machines import RUBBER, SINGLE, Course, Run
-from benchmarks.observer_defaults import Observer, coordinates, drawn, judged, kinds, known_of, spring_share
+from benchmarks.observer_defaults import (
+    Observer,
+    coordinates,
+    drawn,
+    judged,
+    kinds,
+    known_of,
+    ratio,
+    spring_share,
+)
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.feedback.observer import CorrectedDesign, Duty, design_corrected_observer
 from nlsdesign.feedback.observer.corrected.balance import DRIVE, OFFSET, RELAXING, REST
@@ -107,6 +116,20 @@ def test_over_the_spread_it_errs_less_than_the_cascade_and_says_how_much(
     assert np.mean(corrected > 2.0 * said) <= 0.1
     # What it says is at least what no estimator can know of a common scale, and less than the cascade's.
     assert np.all(said < spring_share(course, prior) * 2.8)
+
+
+def test_a_number_three_spreads_off_costs_less_than_the_simpler_observer_that_hears_it(
+    bench: tuple[Course, Prior, dict[str, Observer]],
+) -> None:
+    """Beside a wrong rubber the cascade is the measure, beside a wrong torque constant a single ratio."""
+    course, prior, observers = bench
+    spring = np.array([n.endswith("area") or "modulus" in n for n in prior.names])
+    drive = np.array([n.endswith("torque_constant") for n in prior.names])
+    simpler = {"rubber": observers["cascade"], "drive": ratio(course, observers["cascade"], prior)}
+    for (what, other), off in zip(simpler.items(), (spring, drive), strict=True):
+        run = course.run(drawn(course, prior, 3.0 * prior.deviations * off))
+        simple, default = (judged(course, o, [run])[0][0] for o in (other, observers["default"]))
+        assert np.all(default < (0.5 if what == "rubber" else 0.9) * simple), what
 
 
 @cache

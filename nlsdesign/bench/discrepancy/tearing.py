@@ -103,6 +103,14 @@ def behind_ratio(measured: Measured, value: Expression, known: Mapping[str, Expr
     return (value - offset) / ca.jacobian(seen, symbol)
 
 
+def behind_declared_ratio(model: FlatModel, measured: Measured, values: Array) -> Array:
+    """Return the variable that measured values stand for, with the ratio that the model has."""
+    s, value = model.symbols(), ca.SX.sym("value")
+    behind = ca.Function("behind", [value, s.parameter], [behind_ratio(measured, value, named(model, s))])
+    numbers = model.start(model.parameters)
+    return np.asarray(behind(values[None, :], numbers), dtype=np.float64).ravel()
+
+
 _NEAR_ZERO = 1e-9
 """Drive, in SI, below which the slope at zero stands for the straight line to the measured point."""
 _INSIDE = 0.999

@@ -21,7 +21,7 @@ from ....foundation.arrays import Array
 from ....foundation.errors import ConvergenceError, MeasurementError
 from ....foundation.quantity import same_dimension
 from ....model import FlatModel, flatten
-from ....model.readings import ReadingNames, reading_of
+from ....model.readings import reading_of
 from ....model.structure import MovingBody, top_part
 from ...identification.equation_error.block import Block
 from ...identification.equation_error.block_noise import rate_span
@@ -35,7 +35,7 @@ from ..effects.places import efforts_of_ties
 from ..effects.sizes import LONGEST, MIDDLE, QUICKEST, SHIFT, Sizes, efforts_on, span_of
 from ..selection.comparison import Comparison, Judged
 from ..selection.hypothesis import Hypothesis
-from ..tearing import blocks_of
+from ..tearing import behind_declared_ratio, blocks_of, measured_signals
 
 
 class Acting:
@@ -143,11 +143,12 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
     sizes[SHIFT] = records.shift
     quickest: dict[str, float] = {}
     ends: dict[str, list[float]] = {}
-    signal_of = {r.measured: r.signal for r in _shown(model, records)}
-    spans = {name: rate_span(records.records, signal) for name, signal in signal_of.items()}
+    seen = [m for m in measured_signals(model, records.signals) if m.reading.shows_value]
+    spans = {m.shown: rate_span(records.records, m.signal) for m in reversed(seen)}
     for record in records.records:
         known = {s: np.asarray(record.trace[s], float) for s in records.signals}
-        shown = {r.measured: shown_values(model, record, r.signal) for r in _shown(model, records)}
+        read = {m.reading.measured: shown_values(model, record, m.signal) for m in seen}
+        shown = {m.shown: behind_declared_ratio(model, m, read[m.reading.measured]) for m in reversed(seen)}
         moving = [b for b in model.bodies if b.motion in shown]
         shown |= {
             b.rate: _rate(shown[b.motion], record.step, spans[b.motion])
@@ -159,7 +160,7 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
                 _rms(shown[body.rate]), 1e-300
             )
             quickest[body.name] = min(time or np.inf, quickest.get(body.name, np.inf))
-        _enlarge(sizes, {name: _large(values)[0] for name, values in {**known, **shown}.items()})
+        _enlarge(sizes, {name: _large(values)[0] for name, values in {**known, **read, **shown}.items()})
         for body in moving:
             ends.setdefault(body.motion, []).extend(np.quantile(shown[body.motion], (1.0 - _USUAL, _USUAL)))
         for place in {_large(values)[1] for values in shown.values()}:
@@ -172,13 +173,12 @@ def typical_sizes(actuator: Assembly, records: RecordSet) -> Sizes:
     sizes |= {QUICKEST: min(quickest.values())} if quickest else {}
     for body in model.bodies:
         sizes[efforts_on(body.name)] = _effort(actuator, model, body, sizes, quickest.get(body.name))
+        for part in body.geared:
+            motion, rate = (f"{part}.{name}" for name in actuator[part].motion_names)  # type: ignore[attr-defined]
+            ratio = sizes.get(body.rate, 0.0) / (sizes.get(rate, 0.0) or math.inf)
+            sizes[efforts_on(part)] = ratio * sizes[efforts_on(body.name)]
+            sizes[span_of(motion)] = sizes.get(span_of(body.motion), 0.0) / (ratio or math.inf)
     return Sizes({name: value for name, value in sizes.items() if 0.0 < value < np.inf})
-
-
-def _shown(model: FlatModel, records: RecordSet) -> list[ReadingNames]:
-    """Return what the measured signals show, as far as it can be inferred from them."""
-    readings = (reading_of(model.readings, signal) for signal in records.signals)
-    return [reading for reading in readings if reading.shows_value]
 
 
 def _effort(

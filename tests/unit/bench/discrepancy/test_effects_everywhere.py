@@ -11,7 +11,7 @@ import pytest
 
 from nlsdesign.bench.discrepancy.effects import ALL, Candidate, Unknown
 from nlsdesign.bench.discrepancy.effects.places import turns_per_turn
-from nlsdesign.bench.discrepancy.effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on
+from nlsdesign.bench.discrepancy.effects.sizes import LONGEST, QUICKEST, Sizes, efforts_on, span_of
 from nlsdesign.bench.discrepancy.screening.scale_and_sign import typical_sizes
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.records.mapping import Column
@@ -19,7 +19,9 @@ from nlsdesign.components import (
     Assembly,
     DriveDelay,
     Inertia,
+    Mass,
     Part,
+    Screw,
     Sensor,
 )
 from nlsdesign.components.assembly.deck_writer import deck_text, declare
@@ -219,6 +221,26 @@ def test_where_nothing_but_inertia_is_there_the_effort_is_that_of_the_motion() -
     assert sizes[QUICKEST] == pytest.approx(1.0 / (4.0 * np.pi), rel=0.03)
     assert sizes[efforts_on("wheel")] == pytest.approx(0.5 * 0.4 * (4.0 * np.pi) ** 2, rel=0.06)
     assert sizes[LONGEST] == pytest.approx(2.998)
+
+
+def test_what_is_seen_behind_a_screw_has_the_sizes_of_what_is_in_front_of_it() -> None:
+    """A carriage on a screw of 10 mm, its scale at 50 mm and 2 Hz: motor, thread and carriage by hand."""
+    made = assembly(
+        "axis",
+        servo=Inertia(inertia=2e-4),
+        carriage=Mass(mass=30.0),
+        screw=Screw(between=("servo", "carriage"), lead=0.01),
+    )
+    sizes, turns = typical_sizes(made, swing(made, {"carriage.position": ("m", 0.05)})), 2.0 * np.pi / 0.01
+    speed, quickest = 0.05 * 4.0 * np.pi, 1.0 / (4.0 * np.pi)
+    effort = (2e-4 * turns + 30.0 / turns) * speed / quickest
+    expected = {
+        "carriage.position": 0.05, "carriage.speed": speed, "servo.angle": 0.05 * turns,
+        "servo.speed": speed * turns, QUICKEST: quickest, efforts_on("servo"): effort,
+        efforts_on("carriage"): effort * turns, span_of("servo.angle"): 0.1 * turns,
+        span_of("carriage.position"): 0.1,
+    }  # fmt: skip
+    assert {name: sizes[name] for name in expected} == pytest.approx(expected, rel=0.06)
 
 
 def test_one_sample_that_stands_out_is_no_size() -> None:
