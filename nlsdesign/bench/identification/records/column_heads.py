@@ -24,7 +24,7 @@ from .mapping import Column, ColumnMap
 _TIME_NAMES = ("t", "time")
 _TIME_WORDS = (
     "timestamp", "seconds", "ms", "elapsed time", "zeit", "zeitstempel", "temps", "tiempo", "tempo", "tid",
-    "tijd", "czas", "aika", "idő", "время", "时间", "時間",
+    "tijd", "czas", "aika", "idő", "dauer", "durée", "время", "时间", "時間",
 )  # fmt: skip
 """Further names of a time: of instruments, and in languages of benches."""
 _LOADS = frozenset({

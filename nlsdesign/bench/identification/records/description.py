@@ -200,6 +200,10 @@ def _clock(table: RecordTable) -> tuple[str, str, bool]:
     named = times_among(table.heads)
     if named:
         return (*named[0], False)
+    # Whatever it is called in a language that is not known here.
+    for head in table.heads:
+        if _is_clock(head, table):
+            return head, name_and_unit(head)[1] or "s", False
     for head in times_without_unit(table.heads):
         step = float(np.median(np.diff(table.given[head])))
         return head, "ms" if step > _LONGEST_STEP else "s", True

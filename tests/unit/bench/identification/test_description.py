@@ -48,6 +48,15 @@ def test_columns_units_clock_and_gaps_are_told_and_the_mapping_loads(
     assert [r.name for r in records.records] == ["a", "b part 1", "b part 2", "c"]
 
 
+def test_a_clock_with_an_unknown_name_is_found_by_its_unit(tmp_path: Path, model: FlatModel) -> None:
+    for name in ("a", "b", "c"):
+        write(tmp_path, name, table(), ("Trajanje [s]", "kot [deg]", "navor [N*m]"))
+    found = describe_records(tmp_path, model)
+    assert (found.time, found.time_unit, found.problem) == ("Trajanje [s]", "s", "")
+    (tmp_path / "records.toml").write_text(found.mapping(), encoding="utf-8")
+    assert len(load_records(tmp_path, model).records) == 3
+
+
 def test_what_is_not_certain_is_left_as_a_comment_with_its_choices(tmp_path: Path) -> None:
     two = flatten(
         wheel(
