@@ -213,13 +213,18 @@ def _effort_at_standstill(terms: BalanceTerms, reading: Expression) -> Expressio
 
 
 def _states_behind(terms: BalanceTerms, reading: Expression) -> list[int]:
-    """Return the states that a drive reaches."""
+    """Return the states through which a drive reaches its effort, as that of a winding.
+
+    One that a drive moves by its square alone, such as the heat of a winding, passes nothing on: it changes
+    what the drive gives, and is no part of it.
+    """
     reached: list[int] = []
     frontier: list[Expression] = [reading]
     while frontier:
         symbol = frontier.pop()
         for i in range(terms.state.numel()):
-            if i not in reached and ca.depends_on(terms.derivative[i], symbol):
+            at_zero = ca.substitute(ca.jacobian(terms.derivative[i], symbol), symbol, ca.SX(0))
+            if i not in reached and not ca.simplify(at_zero).is_zero():
                 reached.append(i)
                 frontier.append(terms.state[i])
     return sorted(reached)
