@@ -127,6 +127,8 @@ def _inertial_effort(judged: Judged) -> Array:
 
 _FACTOR = 4.0
 """Factor between measured and predicted beyond which a unit or a sign is wrong: no effect is that large."""
+_ALIKE = 0.5
+"""Share of the squares of a signal that the prediction must explain, times that factor."""
 _USUAL = 0.998
 """Share of the samples that do not exceed the size of a signal: the others are taken for spikes."""
 
@@ -220,7 +222,11 @@ def _rms(values: Array) -> float:
 
 
 def scale_findings(comparison: Comparison, base: Hypothesis) -> list[Finding]:
-    """Return records whose measured signal is many times, or a small part of, what the model predicts."""
+    """Return records whose measured signal is many times, or a small part of, what the model predicts.
+
+    It must have the course of that: where a stiff spring lies between two encoders, a fault of one of them
+    makes the prediction many times as large, and of another course.
+    """
     findings = []
     for judged in comparison.judged(base):
         target = judged.block.target
@@ -228,7 +234,8 @@ def scale_findings(comparison: Comparison, base: Hypothesis) -> list[Finding]:
             continue
         measured, predicted = judged.record.trace[target], judged.predicted
         ratio = float(measured @ predicted) / max(float(predicted @ predicted), 1e-300)
-        if not 1.0 / _FACTOR < ratio < _FACTOR:
+        alike = ratio * float(measured @ predicted) / max(float(measured @ measured), 1e-300)
+        if alike > _ALIKE and not 1.0 / _FACTOR < ratio < _FACTOR:
             head = comparison.bench.records.column(target).name
             findings.append(
                 Finding(
