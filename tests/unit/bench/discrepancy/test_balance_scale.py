@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from nlsdesign import components as c
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import refitted, scale_findings
 from nlsdesign.bench.discrepancy.tearing import BalanceTerms, blocks_of, scaled_balance
 from nlsdesign.bench.identification import Record, RecordSet
 from nlsdesign.bench.identification.equation_error.evidence import Bench
@@ -195,3 +196,38 @@ def test_a_geared_joint_gains_nothing_by_smaller_efforts_and_worse_gears() -> No
     assert np.ptp(declared) > 0.1
     for factors in (everything, gear):
         np.testing.assert_allclose(errors(factors), declared, rtol=1e-4)
+
+
+@pytest.mark.parametrize(("fault", "unit", "expected"), [(0.02, 1.0, 0), (0.0, 1e3, 2)], ids=["disc", "unit"])
+def test_a_fault_of_an_encoder_beside_a_stiff_spring_is_no_other_unit(
+    fault: float, unit: float, expected: int
+) -> None:
+    """A disc that is 20 mrad off makes the predicted torque many times as large, of another course."""
+    units = {"motor.angle": "rad", "motor.current": "A", "link.angle": "rad", "spring.torque": "N*m"}
+    stiffness = Quantity(2000.0, "N*m/rad", "sheet", 0.05)
+    made = assembly(
+        "joint",
+        motor=c.GearedMotor(inertia=0.5, gear_ratio=25.0, torque_constant=0.03),
+        link=c.Inertia(inertia=1.0),
+        spring=tie(c.Spring(stiffness=stiffness), "motor", "link"),
+        loss=tie(c.Dashpot(damping=Quantity(2.0, "N*m*s/rad")), "motor", "link"),
+        weak=tie(c.Spring(stiffness=Quantity(2.0, "N*m/rad")), "link"),
+    )
+    rng, model, result = np.random.default_rng(5), flatten(made, outputs=["link.angle", "spring.torque"]), []
+    for number, pace in enumerate([1.5, 2.2]):
+        slow, quick = np.sin(2 * np.pi * 0.25 * TIME), np.sin(2 * np.pi * pace * TIME)
+        current = 3.0 * slow + 4.0 * quick
+        run = simulate(model, TIME, inputs={"motor.current": current})
+        link = run["link.angle"] + fault * np.cos(run["link.angle"])
+        read = (run["motor.angle"], current, link, unit * run["spring.torque"])
+        noise = (1e-6, 5e-3, 1e-6, unit * 1e-2)
+        signals = {
+            name: values + size * rng.standard_normal(len(TIME))
+            for name, values, size in zip(units, read, noise, strict=True)
+        }
+        result.append(Record(f"r{number}", Trace(TIME, signals, units, f"r{number}")))
+    records = RecordSet(tuple(result), tuple(Column(n, n, u) for n, u in units.items()))
+    again = refitted(made, records)
+    assert again is not None
+    findings = scale_findings(*again)
+    assert len(findings) == expected, [str(each) for each in findings]

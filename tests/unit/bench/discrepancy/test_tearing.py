@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -15,6 +17,7 @@ from nlsdesign.components import (
     ROTATION,
     Assembly,
     CurrentDrivenMotor,
+    Dashpot,
     Eccentricity,
     Encoder,
     Fixed,
@@ -23,12 +26,14 @@ from nlsdesign.components import (
     SampleAndHold,
     Spring,
     TransportDelay,
+    WindingHeat,
     tie,
 )
 from nlsdesign.components.assembly.deck_writer import declare
 from nlsdesign.components.assembly.named_parts import assembly
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
+from nlsdesign.foundation.quantity import Quantity
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace, simulate
 
@@ -175,6 +180,32 @@ def remaining(block: Block, record: Record) -> float:
     output = driven.respond(driven.samples(record, {}), {}).output
     error = (record.trace[block.target] if block.target else 0.0) - output
     return float(np.sqrt(np.mean((smoothing(len(TIME), WIDTH, 5) @ error) ** 2)))
+
+
+def test_a_drive_that_grows_warm_is_not_judged_by_what_it_would_give_once_warm() -> None:
+    """A wrong damping is as large as it is: at 8 A the steady torque I/(1 + (I/4 A)²) falls with current."""
+    heat = WindingHeat(halving=4.0, cooling_time=3.0)
+    motor = CurrentDrivenMotor(
+        inertia=1e-3, torque_constant=0.1, resistance=0.5, current_limit=99.0, voltage_limit=1e4,
+        chain=(("heat", heat),),
+    )  # fmt: skip
+    bearing = tie(Dashpot(damping=Quantity(0.02, "N*m*s/rad")), "motor")
+    made = assembly("warm", motor=motor, bearing=bearing)
+    current = 8.0 * np.sin(2.0 * np.pi * 1.5 * TIME)
+    run = simulate(
+        flatten(made, outputs=["motor.angle", "motor.speed"]), TIME,
+        inputs={"motor.current": current}, tolerance=1e-10,
+    )  # fmt: skip
+    speed = run["motor.speed"]
+    record = Record(
+        "run", replace(run, signals={"motor.angle": run["motor.angle"], "motor.current": current})
+    )
+    (block,) = blocks_of(flatten(made), ("motor.angle", "motor.current"))
+    driven = DrivenBlock(block, ["bearing.damping"], records=[record])
+    wrong = {"bearing.damping": 0.05}
+    left = driven.respond(driven.samples(record, wrong), wrong).output
+    expected = 0.03 * speed[100:-100]
+    np.testing.assert_allclose(left[100:-100], expected, atol=0.02 * np.abs(expected).max())
 
 
 def test_a_wrong_number_shows_only_in_its_own_block(rig: Assembly) -> None:
