@@ -85,7 +85,7 @@ def test_the_bound_follows_from_count_and_spreads() -> None:
     assert with_innovation_alarm(cascade(), plant()) is cascade()
 
 
-@pytest.mark.parametrize("kind", ["cascade", "corrected"])
+@pytest.mark.parametrize("kind", ["cascade", pytest.param("corrected", marks=pytest.mark.slow)])
 def test_a_machine_as_declared_is_quiet_and_a_drifting_encoder_is_not(kind: str) -> None:
     times = np.arange(0.0, 1.5, 1e-3)
     current = 3.0 * np.sin(2.0 * np.pi * 2.0 * times)

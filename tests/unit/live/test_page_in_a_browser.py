@@ -131,6 +131,8 @@ def test_every_control_has_a_name_of_its_own_and_every_figure_its_numbers(tab: T
     tab.evaluate("for (const each of document.querySelectorAll('.more, .menu')) each.open = false")
 
 
+# It waits for several whole designs.
+@pytest.mark.slow
 def test_a_drag_is_said_once_and_a_slide_by_its_slider_alone(tab: Tab) -> None:
     words = "document.getElementById('state-words').textContent"
     tab.until(f"!{STATE}.includes('quick') && !/^Quick|The check runs/.test({words})")

@@ -82,7 +82,12 @@ def verdict_of(
         pytest.param(
             Dress(mapping=exchanged), "current_A", "read exchanged with 'angle'", marks=pytest.mark.slow
         ),
-        (Dress("belt_axis", scaled="load_angle", factor=180.0 / np.pi), "load_angle", "read in deg"),
+        pytest.param(
+            Dress("belt_axis", scaled="load_angle", factor=180.0 / np.pi),
+            "load_angle",
+            "read in deg",
+            marks=pytest.mark.slow,
+        ),
     ],
     ids=["unit", "rotor", "exchanged", "free load"],
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from types import SimpleNamespace
 from typing import cast
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -71,7 +72,11 @@ def judged(record: Record, error: Array, *, name: str = "motor", target: str | N
         target=target,
         output="motor.unbalanced",
         drives={},
-        model=SimpleNamespace(outputs=(output,), inputs=()),
+        model=SimpleNamespace(
+            outputs=(output,),
+            inputs=(),
+            symbols=lambda: SimpleNamespace(output=ca.SX(1, 1), input=ca.SX(0, 1)),
+        ),
     )
     return Judged(block, record, floor, np.zeros(len(TIME)), matrix @ error / SIGMA)  # type: ignore[arg-type]
 
