@@ -261,7 +261,7 @@ class Mounting:
         try:
             keyed = key_load(replace(self.machined, keyway=True).part(self.contour), self.torque)
         except NlsError:
-            keyed = None
+            keyed = None  # no key is made for this bore, or its keyway leaves too thin a wall: then none does
         if keyed is not None and keyed.carried:
             return f"keyway = true does: {keyed}"
         return "leave room for a key or a clamp, or take a larger body_radius"

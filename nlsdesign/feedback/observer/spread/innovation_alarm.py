@@ -70,7 +70,7 @@ def with_innovation_alarm(observer: FlatModel, plant: FlatModel) -> FlatModel:
     try:
         balance = declared_balance(plant, estimate, measured)
     except (ArrangementError, ConvergenceError, ValueRangeError):
-        return observer
+        return observer  # no spreads, or a weight at rest: nothing says how large the innovation may be
     drive = observer.inputs[1 + balance.place].name
     limit, spring, current = explained(observer, plant, balance, measured)
     if not limit:

@@ -427,5 +427,5 @@ def _bound(
         try:
             bounds.append(estimator_bound(bench.model.with_values(values), known, inputs, sensed))
         except ConvergenceError:
-            return np.zeros(0)
+            return np.zeros(0)  # an unstable motion has no bound; the table says "not computed"
     return np.array([rms_over(bounds, first, last) for _, first, last in bench.stretches])
