@@ -12,6 +12,7 @@ import pytest
 from nlsdesign.bench.discrepancy import Verdict, diagnose
 from nlsdesign.bench.discrepancy.effects import Candidate
 from nlsdesign.bench.discrepancy.effects.effect import EffectFunction
+from nlsdesign.bench.discrepancy.screening.scale_and_sign import error_share, refitted
 from nlsdesign.bench.identification import load_records
 from nlsdesign.components import Assembly
 from nlsdesign.components.assembly.deck_writer import declare
@@ -95,6 +96,18 @@ def test_a_column_of_which_nearly_all_is_wrong_is_suspect_before_effects_are_loo
     dress: Dress, column: str, words: str, tmp_path: Path
 ) -> None:
     suspected(verdict_of(tmp_path, (), dress, (none_is_asked_for,)), column, words)
+
+
+def test_the_share_of_a_load_behind_a_belt_is_that_of_its_own_effort(tmp_path: Path) -> None:
+    """The current of the motor acts on the motor alone: of the load it would be a share of nothing."""
+    write_kind_case(tmp_path, "belt_axis", (), 1.0, 1311, says_held=True)
+    for file in tmp_path.glob("*.csv"):
+        if file.stem not in ONLY:
+            file.unlink()
+    rig = declare(load_deck(tmp_path / "deck.toml"))
+    again = refitted(rig, load_records(tmp_path, flatten(rig)))
+    assert again is not None
+    assert 0.0 < error_share(*again, "load") < 0.1
 
 
 def test_a_column_that_runs_otherwise_between_its_samples_is_suspect_where_no_effect_explains_it(
