@@ -87,6 +87,8 @@ class Candidate:
         what is read may do.
     simpler
         Identifiers of the effects of which this one is a richer form, so that it must predict better.
+    acts_in
+        Names of the blocks in which its numbers stand; empty until it is fitted.
     """
 
     effect: str
@@ -99,6 +101,7 @@ class Candidate:
     explains_lag: bool = False
     bends_reading: bool = False
     simpler: tuple[str, ...] = ()
+    acts_in: frozenset[str] = frozenset()
 
 
 EffectFunction: TypeAlias = Callable[[Assembly], Sequence[Candidate]]

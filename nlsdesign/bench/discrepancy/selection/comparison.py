@@ -269,7 +269,9 @@ class Comparison:
         groups = [g for g in self._groups(before) if any(names & set(each.free) for each in g)]
         if wanted and not any(each.block.name in wanted for g in groups for each in g):
             return None
-        return self._refitted(before, groups, candidate.unknowns)
+        acts_in = frozenset(each.block.name for g in groups for each in g if names & set(each.free))
+        newest = replace(before.newest, acts_in=acts_in)
+        return self._refitted(replace(before, added=(*before.added[:-1], newest)), groups, candidate.unknowns)
 
     def polished(self, hypothesis: Hypothesis, *, released: Collection[str] = ()) -> Hypothesis:
         """Refit a hypothesis to all samples, from where it stands.

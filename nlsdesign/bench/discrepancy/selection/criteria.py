@@ -27,7 +27,7 @@ right name may be in no list. What the records cannot tell apart shares the prob
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, Generic, TypeVar
 
@@ -232,16 +232,21 @@ class Change:
             return True
         return total_excess(self.before) <= self.criteria.richer * total_excess(self.after)
 
-    def objections(self, standing: Standing) -> tuple[str, ...]:
-        """Return in words why an effect may not be named, by what its numbers say too; nothing if it may."""
+    def objections(self, standing: Standing, acts_in: Collection[str] = ()) -> tuple[str, ...]:
+        """Return in words why an effect may not be named, by what its numbers say too; nothing if it may.
+
+        ``acts_in``: blocks in which its numbers stand. What it explains elsewhere it explains by declared
+        numbers that move; empty where that is not known.
+        """
         words, shares = [], self.shares
-        best, gained = max(shares.values(), default=0.0), self.gain
+        only_declared = all(name == DECLARED for name in shares)
+        own = [s for name, s in shares.items() if only_declared or not acts_in or name in acts_in]
+        best, gained = max(own, default=0.0), self.gain
         if best < self.criteria.least_share or total_excess(self.after) >= total_excess(self.before):
             words.append(
                 f"it explains {100.0 * max(best, 0.0):.0f} % of what is left, "
                 f"less than {100.0 * self.criteria.least_share:.0f} %"
             )
-        only_declared = all(name == DECLARED for name in shares)
         if not only_declared and not self.criteria.is_more_than_noise(gained):
             words.append(
                 "without its best piece of a record the prediction gains "
@@ -265,11 +270,11 @@ class Change:
             return []
         return [f"it drives the declared numbers {now.fit:.1f} standard deviations of their spread away"]
 
-    def is_undecided(self, standing: Standing) -> bool:
+    def is_undecided(self, standing: Standing, acts_in: Collection[str] = ()) -> bool:
         """Tell whether an effect explains what is left, but the records do not determine its numbers."""
         explains = max(self.shares.values(), default=0.0) >= self.criteria.closed_share
         unknown = self.criteria.objections_of_numbers(standing)
-        return explains and bool(unknown) and list(self.objections(standing)) == unknown
+        return explains and bool(unknown) and list(self.objections(standing, acts_in)) == unknown
 
 
 def is_complete(last: Excesses) -> bool:
@@ -298,6 +303,7 @@ class Rival(Generic[T]):
     standing: Standing = field(default_factory=Standing)  # what the fitted numbers say
     simpler: tuple[str, ...] = ()  # effects of which it is a richer form
     place: str = ""  # where the effect sits
+    acts_in: frozenset[str] = frozenset()  # blocks in which its numbers stand; empty where that is not known
 
     def left_in(self, block: str) -> float:
         """Return the excess that it leaves in a block."""
@@ -309,11 +315,11 @@ class Rival(Generic[T]):
 
     def objections(self, criteria: Criteria, before: Excesses) -> tuple[str, ...]:
         """Return in words why it may not be named; nothing if it may."""
-        return self.change(criteria, before).objections(self.standing)
+        return self.change(criteria, before).objections(self.standing, self.acts_in)
 
     def is_undecided(self, criteria: Criteria, before: Excesses) -> bool:
         """Tell whether it explains what is left, but the records do not determine its numbers."""
-        return self.change(criteria, before).is_undecided(self.standing)
+        return self.change(criteria, before).is_undecided(self.standing, self.acts_in)
 
 
 @dataclass(frozen=True, eq=False)

@@ -271,4 +271,5 @@ def rival_of(hypothesis: Hypothesis, after: Excesses) -> Rival[Hypothesis]:
         standing_of(newest.unknowns, hypothesis.fits.values()),
         newest.simpler,
         newest.location,
+        newest.acts_in,
     )

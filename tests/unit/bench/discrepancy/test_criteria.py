@@ -75,6 +75,14 @@ def taken(*rivals: Rival[str], rule: Criteria = RULE) -> tuple[str, ...] | None:
 # --- the rule as a whole --------------------------------------------------------------------------
 
 
+def test_what_moved_numbers_explain_in_another_block_is_not_what_an_effect_explains() -> None:
+    """A drive that saturates explains the joint's block by a stiffness that moves, and little of its own."""
+    change = Change(SHARES_ONLY, FIRST, with_left(spring=0.0, motor=1.5e4))
+    assert change.objections(standing()) == change.objections(standing(), {"spring"}) == ()
+    (why,) = change.objections(standing(), {"motor"})
+    assert why.startswith("it explains 25 % of what is left, less than 50 %")
+
+
 def test_every_number_of_the_rule_has_a_meaning_and_none_can_be_changed_in_place() -> None:
     described = RULE.described()
     assert [each["name"] for each in described] == [f.name for f in fields(Criteria)]
