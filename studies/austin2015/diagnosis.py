@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import nlsdesign as nls
@@ -12,23 +11,15 @@ from nlsdesign.foundation.progress import Progress
 
 from .._published import bench_records, with_bench_sensors
 
-RIVALS = (effects.rate_independent_hysteresis, effects.second_relaxation)
-"""What the loss of the rubber is most easily mistaken for, and it itself: enough for the fast way."""
-SLOWEST = ("sine_0.1Hz",)
-"""What the fast way leaves out of the records: a quarter of the samples, which no other motion needs."""
+NAMED = (effects.second_relaxation,)
+"""What the whole catalogue names: all that the fast way asks for."""
 
 
 def diagnose_bench(
-    actuator: nls.Assembly, out: Path, progress: Progress, catalogue: Sequence[Effect] | None = None,
-    *, without: Sequence[str] = (),
-) -> Verdict:  # fmt: skip
-    """Name what the records show and the declared actuator lacks; write verdict and better deck.
-
-    ``without``: names of records that are left out.
-    """
+    actuator: nls.Assembly, out: Path, progress: Progress, catalogue: Sequence[Effect] | None = None
+) -> Verdict:
+    """Name what the records show and the declared actuator lacks; write verdict and better deck."""
     bench = with_bench_sensors(actuator)
-    whole = bench_records(bench)
-    records = replace(whole, records=tuple(r for r in whole.records if r.name not in without))
-    verdict = nls.diagnose(bench, records, catalogue=catalogue, progress=progress.note)
+    verdict = nls.diagnose(bench, bench_records(bench), catalogue=catalogue, progress=progress.note)
     nls.write_verdict(verdict, out / "diagnosis")
     return verdict

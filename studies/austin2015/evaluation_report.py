@@ -22,7 +22,10 @@ def evaluation_sections(results: Results) -> list[Section]:
 
 
 def _of_one(name: str, judged: LoopEvaluation) -> list[Section]:
-    signed = [*(judged.spread.findings() or [judged.spread.margins()]), *judged.spread.words()]
+    means = f"Where it begins to oscillate: {judged.onset}."
+    if (spread := judged.spread) is not None:
+        signed = [*(spread.findings() or [spread.margins()]), *spread.words()]
+        means += f" Over the spread of the deck: {'; '.join(signed)}."
     lost = [
         f"{response.amplitude:g} N·m at {f:.2g} Hz: {verdict}"
         for response in judged.responses
@@ -41,8 +44,7 @@ def _of_one(name: str, judged: LoopEvaluation) -> list[Section]:
             nls.figures.margins_over_angle([judged.margins]),
             caption="Of the linearised sampled loop, cut at the current, while the machine slides; nothing "
             "where it is unstable or the drive cannot hold the angle.",
-            means=f"Where it begins to oscillate: {judged.onset}. Over the spread of the deck: "
-            f"{'; '.join(signed)}.",
+            means=means,
         ),
         FigureSection(
             f"Output impedance, {name}",

@@ -7,7 +7,8 @@ import numpy as np
 import nlsdesign as nls
 from nlsdesign.presentation.report import FigureSection, FoldedSection, Section, TableSection
 
-from .results import ActuatorResults, Results
+from .results import Results
+from .torque_loop import Cosimulated
 from .tracking import AMPLITUDE, PROPORTIONAL, SETTLED
 
 _SHOWN = 45.0  # gain of the run that is drawn: with it the published actuator reaches its current limit
@@ -15,7 +16,9 @@ _SHOWN = 45.0  # gain of the run that is drawn: with it the published actuator r
 
 def loop_sections(results: Results) -> list[Section]:
     """Show the tracking error of the torque loop on both actuators; single runs folded."""
-    more = (_table(results), _one_run(results), _cosimulated("designed", results.designed))
+    runs = {name: each.loop.cosimulated for name, each in reversed(results.both.items())}
+    last = next((name, run) for name, run in runs.items() if run is not None)
+    more = (_table(results), _one_run(results), _cosimulated(*last))
     return [_errors(results), FoldedSection("More on tracking, and the co-simulation of the code", more)]
 
 
@@ -87,15 +90,15 @@ def _one_run(results: Results) -> FigureSection:
     )
 
 
-def _cosimulated(name: str, results: ActuatorResults) -> FigureSection:
+def _cosimulated(name: str, run: Cosimulated) -> FigureSection:
     loop = nls.figures.closed_loop_of(
-        results.loop.cosimulated,
+        run.trace,
         desired="controller.spring.torque.desired",
         true="plant.spring.torque",
         estimated="observer.spring.torque",
         current="controller.motor.current",
     )
-    difference = results.loop.difference
+    difference = run.difference
     return FigureSection(
         f"Closed torque loop, {name}",
         nls.figures.closed_loop(loop, differences={"true torque": difference}),
