@@ -17,7 +17,7 @@ from nlsdesign.foundation.work_sharing import parallel_map
 
 from .._published import declared_actuator
 from .design import FIRST_DESIGN, design_spring
-from .diagnosis import NAMED, diagnose_bench
+from .diagnosis import NAMED, SLOWEST, diagnose_bench
 from .evaluation import evaluate_loop
 from .figures import compare_with_figures
 from .generated import Code, code_of_three_decks
@@ -48,8 +48,9 @@ def main(out: Path, fast: bool = False) -> Results:
     def branch(number: int) -> ActuatorResults | Verdict:
         """Do what needs nothing of the others, so that each may have a core of its own."""
         if number == 1:
+            catalogue, without = (NAMED, SLOWEST) if fast else (None, ())
             with steps.step("diagnosis of the bench records"):
-                return diagnose_bench(actuator, out, steps, NAMED if fast else None)
+                return diagnose_bench(actuator, out, steps, catalogue, without=without)
         name, machine = ("designed", cam.design.actuator) if number else ("published", actuator)
         deck = out / ("designed.toml" if number else "actuator.toml")
         return work_up(machine, deck, out / name, steps=steps, fast=fast)

@@ -18,6 +18,7 @@ def observer_sections(results: Results) -> list[Section]:
     # The designed one first: its colour is that of what a figure is about.
     first, *others = (_spread_figure(*each) for each in reversed(results.over_spread.items()))
     more = (
+        _errors_in_numbers(results),
         *others,
         *(_generated(*each) for each in results.over_spread.items()),
         _on_bench("designed", results.designed),
@@ -29,7 +30,6 @@ def observer_sections(results: Results) -> list[Section]:
     )
     return [
         first,
-        _errors_in_numbers(results),
         FoldedSection("Observability and stability over the angle", _over_angle(results)),
         FoldedSection("More on the observers", more),
         FoldedSection("What is proved", (_bounds(results), *certificates)),
