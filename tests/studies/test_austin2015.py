@@ -124,6 +124,10 @@ def test_the_whole_catalogue_names_what_the_fast_way_asks_for(tmp_path: Path, st
 def test_what_is_not_folded_fits_on_twelve_screens(study: Study) -> None:
     out = study.out
     with browser() as tab:
+        if study.whole:  # whose figures are drawn for a telephone too
+            tab.look(390, height=844)
+            tab.open(out / "report.html")
+            assert tab.evaluate("document.documentElement.scrollHeight") < 12 * 844
         tab.look(1400, height=900)
         tab.open(out / "report.html")
         assert tab.evaluate("document.documentElement.scrollHeight") < 12 * 900
