@@ -173,9 +173,8 @@ def list_studies(as_json: bool) -> None:
     for name in study_names():
         # The first line of its docstring: a study is read and not loaded.
         file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
-        rows.append(
-            (name, file.read_text(encoding="utf-8").removeprefix('"""').partition("\n")[0].rstrip('"'))
-        )
+        text = file.read_text(encoding="utf-8").removeprefix('"""')
+        rows.append((name, text.partition("\n")[0].rstrip('"')))
     if as_json:
         show_json(dict(rows))
         return

@@ -46,7 +46,7 @@ ABSTRACT = (
 )
 
 FIRST_LOOK = (
-    "This is a first look (`--fast`), coarser, with fewer draws and frequencies. It leaves out the "
+    "A run with `--fast` is coarser, with fewer draws and frequencies. It leaves out the "
     "spread, proofs and margins of the designed actuator, margins over the spread of the published one, FMUs "
     "of all others, code with the observer that learns, and figures for a telephone. The diagnosis asks only "
     "for the effect that the whole study names among all. `nlsdesign study run austin2015` does all of it."
@@ -72,6 +72,7 @@ def write_page(results: Results, out: Path, *, fast: bool) -> None:
         out / "report.html",
         answers(results),
         key_numbers(results),
+        *([TextSection("What this first look leaves out", FIRST_LOOK)] if fast else []),
         *chapter_of_design(results),
         Chapter("Estimate and control, for the control engineer", CONTROL),
         *observer_sections(results),
@@ -83,7 +84,7 @@ def write_page(results: Results, out: Path, *, fast: bool) -> None:
         *actuator_sections(results),
         *file_sections(results, out),
         title="A cam-rubber actuator, from deck to report",
-        abstract=f"{ABSTRACT}\n\n{FIRST_LOOK}" if fast else ABSTRACT,
+        abstract=ABSTRACT,
         narrow=not fast,
     )
 

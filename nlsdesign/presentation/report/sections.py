@@ -432,13 +432,9 @@ _PAGE_TONES = {
 
 
 def write_report(
-    path: Path,
-    *sections: Section,
-    title: str,
-    abstract: str = "",
-    facts: Mapping[str, str] | None = None,
+    path: Path, *sections: Section, title: str, abstract: str = "", facts: Mapping[str, str] | None = None,
     narrow: bool = True,
-) -> Path:
+) -> Path:  # fmt: skip
     """Write a report and return its file, which appears whole or not at all.
 
     Parameters

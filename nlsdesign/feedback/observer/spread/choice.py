@@ -127,9 +127,8 @@ def choose_observer(
         learned = expected_error(model, learning, duty)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
-        return ObserverOfChoice(
-            with_alarm(cascade, model), f"cascade, for it cannot be corrected: {error}", ()
-        )
+        reason = f"cascade, for it cannot be corrected: {error}"
+        return ObserverOfChoice(with_alarm(cascade, model), reason, ())
     alone = learning.balance.before
     sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
     both = f"expected over the spread {sizes} of the cascade"
