@@ -38,7 +38,7 @@ from .figures import FigureComparison
 from .generated_report import generated_sections
 from .loop_report import loop_sections
 from .observer_report import observer_sections
-from .results import Results
+from .results import ActuatorResults, Results
 
 ABSTRACT = (
     "The cam-rubber actuator of Austin, Schepelmann and Geyer (IROS 2015) and a spring designed anew for it: "
@@ -46,9 +46,9 @@ ABSTRACT = (
 )
 
 FIRST_LOOK = (
-    "A run with `--fast` is coarser, with fewer draws and frequencies. It leaves out the "
-    "spread, proofs and margins of the designed actuator, margins over the spread of the published one, FMUs "
-    "of all others, code with the observer that learns, and figures for a telephone. The diagnosis asks only "
+    "A run with `--fast` is coarser, with fewer draws and frequencies. It leaves out spread, proofs and "
+    "margins of the designed actuator, margins over the spread of the published one, FMUs of all others, "
+    "code with the observer that learns, equations, and figures for a telephone. The diagnosis asks only "
     "for the effect that the whole study names among all. `nlsdesign study run austin2015` does all of it."
 )
 
@@ -81,7 +81,7 @@ def write_page(results: Results, out: Path, *, fast: bool) -> None:
         *diagnosis_sections(results),
         *generated_sections(results.generated),
         *figure_sections(results.figures),
-        *actuator_sections(results),
+        actuator_section(results.published, fast=fast),
         *file_sections(results, out),
         title="A cam-rubber actuator, from deck to report",
         abstract=ABSTRACT,
@@ -184,26 +184,18 @@ def key_numbers(results: Results) -> Section:
     return NumbersSection("Key numbers", keys)
 
 
-def actuator_sections(results: Results) -> list[Section]:
-    """Show what was declared."""
-    actuator = results.published.actuator
-    return [
-        FoldedSection(
-            "What was declared",
-            (
-                TextSection(
-                    "Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)
-                ),
-                numbers_table("Numbers of the deck", actuator.quantities()),
-                EquationsSection(
-                    "Equations",
-                    nls.equations(results.published.model),
-                    "The flat model; `f(…)` stands for a long law.",
-                ),
-            ),
-            "Parts, numbers with unit, source and spread, and the equations of the published actuator",
-        )
+def actuator_section(published: ActuatorResults, *, fast: bool) -> Section:
+    """Show what was declared; the equations, which SymPy writes, where there is time."""
+    actuator = published.actuator
+    parts: list[Section] = [
+        TextSection("Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)),
+        numbers_table("Numbers of the deck", actuator.quantities()),
     ]
+    if not fast:
+        words = "The flat model; `f(…)` stands for a long law."
+        parts.append(EquationsSection("Equations", nls.equations(published.model), words))
+    caption = "Parts, numbers with unit, source and spread, and the equations of the published actuator"
+    return FoldedSection("What was declared", tuple(parts), "" if fast else caption)
 
 
 def chapter_of_design(results: Results) -> list[Section]:
