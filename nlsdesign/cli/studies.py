@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import contextlib
 import importlib.util
 import inspect
@@ -174,7 +173,8 @@ def list_studies(as_json: bool) -> None:
     for name in study_names():
         # The first line of its docstring: a study is read and not loaded.
         file = next(path for path in (place / f"{name}.py", place / name / "__init__.py") if path.exists())
-        rows.append((name, (ast.get_docstring(ast.parse(file.read_bytes())) or "").partition("\n")[0]))
+        text = file.read_text(encoding="utf-8").removeprefix('"""')
+        rows.append((name, text.partition("\n")[0].rstrip('"')))
     if as_json:
         show_json(dict(rows))
         return

@@ -21,6 +21,8 @@ MACHINED = nls.MachinedTwoSidedCam(
     hub_bore=nls.quantity(6.0, "mm", source="assumed: shaft of the gear"),
     cable_end=FerruleSeat(diameter=nls.quantity(2.5, "mm", source="assumed: ferrule for this cable")),
 )
+FIRST_DESIGN = DesignSettings(starts=2, look_for_size_ranges=False, draws=200)
+"""Of the fast way: without the ranges of sizes that cost nothing."""
 
 
 def design_spring(actuator: nls.Assembly, out: Path, settings: DesignSettings) -> MadeCam:

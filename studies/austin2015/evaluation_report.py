@@ -15,14 +15,17 @@ from .results import Results
 
 
 def evaluation_sections(results: Results) -> list[Section]:
-    """Show where the loop holds, and where it stops doing so, for both actuators; figures folded."""
+    """Show where the loop holds, and where it stops doing so, for both actuators."""
     judged = {name: each.evaluation for name, each in results.both.items() if each.evaluation is not None}
     figures = [figure for name, each in judged.items() for figure in _of_one(name, each)]
-    return [_table(judged), FoldedSection("Responses, margins and impedance", tuple(figures))]
+    return [FoldedSection("Where the loop holds", (_table(judged), *figures))]
 
 
 def _of_one(name: str, judged: LoopEvaluation) -> list[Section]:
-    signed = [*(judged.spread.findings() or [judged.spread.margins()]), *judged.spread.words()]
+    means = f"Where it begins to oscillate: {judged.onset}."
+    if (spread := judged.spread) is not None:
+        signed = [*(spread.findings() or [spread.margins()]), *spread.words()]
+        means += f" Over the spread of the deck: {'; '.join(signed)}."
     lost = [
         f"{response.amplitude:g} N·m at {f:.2g} Hz: {verdict}"
         for response in judged.responses
@@ -41,8 +44,7 @@ def _of_one(name: str, judged: LoopEvaluation) -> list[Section]:
             nls.figures.margins_over_angle([judged.margins]),
             caption="Of the linearised sampled loop, cut at the current, while the machine slides; nothing "
             "where it is unstable or the drive cannot hold the angle.",
-            means=f"Where it begins to oscillate: {judged.onset}. Over the spread of the deck: "
-            f"{'; '.join(signed)}.",
+            means=means,
         ),
         FigureSection(
             f"Output impedance, {name}",
@@ -76,7 +78,7 @@ def _table(evaluations: Mapping[str, LoopEvaluation]) -> TableSection:
         )
     settled = tuple(f"settled at {a:g} N·m" for a in AMPLITUDES)
     return TableSection(
-        "Where the loop holds",
+        "Margins and onset of limit cycling",
         ("actuator", "least gain margin in dB", "unstable angles", *settled, "onset Kp, simulated", "linear"),
         tuple(rows),
         caption=f"PID with Kp {KP:g} rad/s per N·m behind the cascade, exact numbers. The paper prints no "

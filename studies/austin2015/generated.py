@@ -89,7 +89,7 @@ class GeneratedCode:
     @property
     def numbers(self) -> dict[str, float]:
         """The claimed numbers; none of a run that does not settle."""
-        numbers = {"diagnosed_cosimulation_difference_Nm": float(np.max(np.abs(self.loop.difference)))}
+        numbers = {f"diagnosed_{what}": number for what, number in self.loop.numbers.items()}
         for (deck, kind), each in self.under.items():
             if each.settled:
                 code = f"code_from_{deck}_deck_{kind}"
@@ -109,7 +109,7 @@ def code_of_three_decks(
     model = nls.flatten(better, outputs=["motor.angle", "motor_encoder.reading", "spring.torque"])
     # Records know its numbers far better than the spreads in the deck say: the cascade takes them as exact.
     cascade = nls.observer.design_observer_with_details(model).model
-    loop = export_and_cosimulate(model, cascade, out, 0.25 if fast else 3.0)
+    loop = export_and_cosimulate(model, cascade, out, None if fast else 3.0)
     best = cascade if fast else choose_observer(model).model
     decks = {**others, "diagnosed": Code(model, cascade, best)}
     kinds, cycles = (("cascade",), FEWER) if fast else (("cascade", "best"), CYCLES)

@@ -13,10 +13,9 @@ def generated_sections(generated: GeneratedCode) -> list[Section]:
     return [
         Chapter(
             "What the deck behind the code is worth",
-            "The machine is the actuator as the diagnosis left it. Observer and controller are generated "
-            "from the published deck, from the designed one, whose spring this machine does not have, and "
-            "from the diagnosed deck. Each file names its deck by the digest that stands in the table; "
-            "`nlsdesign export check FOLDER --deck FILE` compares them.",
+            "The machine is the actuator as the diagnosis left it, under code from its own deck, from the "
+            "published one, and from the designed one, whose spring it does not have. Code names its deck by "
+            "the digest in the table; `nlsdesign export check` compares them.",
         ),
         _table(generated),
         FoldedSection("One run", (_figure(generated),)),

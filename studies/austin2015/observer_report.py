@@ -10,14 +10,17 @@ from nlsdesign.presentation.report import FigureSection, FoldedSection, Section,
 
 from .observer import STIFFER, WIDER
 from .results import ActuatorResults, Results
+from .spread import ObserverOverSpread
 
 
 def observer_sections(results: Results) -> list[Section]:
     """Show the errors of the observers over the spread; observability and proofs are folded."""
-    designed, published = (_spread_figure(name, results.both[name]) for name in ("designed", "published"))
+    # The designed one first: its colour is that of what a figure is about.
+    first, *others = (_spread_figure(*each) for each in reversed(results.over_spread.items()))
     more = (
-        published,
-        *(_generated(name, each) for name, each in results.both.items()),
+        _errors_in_numbers(results),
+        *others,
+        *(_generated(*each) for each in results.over_spread.items()),
         _on_bench("designed", results.designed),
         _errors_with_known_numbers(results),
     )
@@ -26,8 +29,7 @@ def observer_sections(results: Results) -> list[Section]:
         for name, each in results.proved.items()
     )
     return [
-        designed,
-        _errors_in_numbers(results),
+        first,
         FoldedSection("Observability and stability over the angle", _over_angle(results)),
         FoldedSection("More on the observers", more),
         FoldedSection("What is proved", (_bounds(results), *certificates)),
@@ -35,10 +37,9 @@ def observer_sections(results: Results) -> list[Section]:
 
 
 def _over_angle(results: Results) -> tuple[Section, ...]:
-    # The designed one first: its colour is that of what a figure is about.
     both = dict(reversed(results.both.items()))
     charts = {name: each.chart for name, each in both.items()}
-    drops = {name: each.spread.drops for name, each in both.items()}
+    drops = {name: each.drops for name, each in reversed(results.over_spread.items())}
     return (
         FigureSection(
             "Observability over the cam angle",
@@ -104,8 +105,8 @@ def _on_bench(name: str, results: ActuatorResults) -> FigureSection:
     )
 
 
-def _spread_figure(name: str, results: ActuatorResults) -> FigureSection:
-    errors = results.spread.errors
+def _spread_figure(name: str, spread: ObserverOverSpread) -> FigureSection:
+    errors = spread.errors
     draws = errors.drawn.shape[1]
     middle, paper = (float(np.max(errors.quantile(each, 0.5))) for each in ("best", "published form"))
     ranked = errors.ranked_causes("best")[:3]
@@ -127,18 +128,17 @@ def _errors_in_numbers(results: Results) -> TableSection:
     return TableSection(
         "Torque errors in numbers",
         ("actuator", "observer", "Hz", "median", "90 %", "rms", "bound on the rms", "exact numbers"),
-        tuple((name, *row) for name, each in results.both.items() for row in each.spread.errors.rows()),
+        tuple((name, *row) for name, each in results.over_spread.items() for row in each.errors.rows()),
         caption="mN·m rms. `best` is the observer that is generated, by the error that is expected over "
         "the spread before anything is drawn.",
     )
 
 
-def _generated(name: str, results: ActuatorResults) -> TextSection:
-    chosen = results.spread.chosen
+def _generated(name: str, spread: ObserverOverSpread) -> TextSection:
     return TextSection(
         f"The observer that is generated, {name}",
-        f"Taken was {chosen.reason}. It is not certified.",
-        drawing=str(chosen.design),
+        f"Taken was {spread.chosen.reason}. It is not certified.",
+        drawing=str(spread.chosen.design),
     )
 
 

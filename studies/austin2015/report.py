@@ -10,6 +10,7 @@ import numpy as np
 
 import nlsdesign as nls
 from nlsdesign.feedback.control.evaluation.spread_margins import GAIN_MARGIN, PHASE_MARGIN, SpreadMargins
+from nlsdesign.feedback.observer import SpreadErrors
 from nlsdesign.presentation.report import (
     CamSection,
     Chapter,
@@ -37,12 +38,18 @@ from .figures import FigureComparison
 from .generated_report import generated_sections
 from .loop_report import loop_sections
 from .observer_report import observer_sections
-from .results import Results
+from .results import ActuatorResults, Results
 
 ABSTRACT = (
-    "Declared once, flattened once: the cam-rubber actuator of Austin, Schepelmann and Geyer (IROS 2015), "
-    "a spring designed anew for it, and for both side by side analysis, observer, torque loop and generated "
-    "code; then what bench records of the published one show is missing."
+    "The cam-rubber actuator of Austin, Schepelmann and Geyer (IROS 2015) and a spring designed anew for it: "
+    "analysis, observer, torque loop and generated code of both, and what bench records show is missing."
+)
+
+FIRST_LOOK = (
+    "A run with `--fast` is coarser, with fewer draws and frequencies. It leaves out spread, proofs and "
+    "margins of the designed actuator, margins over the spread of the published one, FMUs of all others, "
+    "code with the observer that learns, equations, and figures for a telephone. The diagnosis asks only "
+    "for the effect that the whole study names among all. `nlsdesign study run austin2015` does all of it."
 )
 
 CONTROL = (
@@ -59,12 +66,13 @@ RECORDS = (
 )
 
 
-def write_page(results: Results, out: Path) -> None:
+def write_page(results: Results, out: Path, *, fast: bool) -> None:
     """Write ``report.html``: what came out, a chapter for each of two readers, and the rest folded."""
     nls.write_report(
         out / "report.html",
         answers(results),
         key_numbers(results),
+        *([TextSection("What this first look leaves out", FIRST_LOOK)] if fast else []),
         *chapter_of_design(results),
         Chapter("Estimate and control, for the control engineer", CONTROL),
         *observer_sections(results),
@@ -73,10 +81,11 @@ def write_page(results: Results, out: Path) -> None:
         *diagnosis_sections(results),
         *generated_sections(results.generated),
         *figure_sections(results.figures),
-        *actuator_sections(results),
+        actuator_section(results.published, fast=fast),
         *file_sections(results, out),
         title="A cam-rubber actuator, from deck to report",
         abstract=ABSTRACT,
+        narrow=not fast,
     )
 
 
@@ -99,12 +108,10 @@ def answers(results: Results) -> TableSection:
     limits = f"every limit is kept; it sits on: {bound}" if design.met else str(design.miss)
     known, followed, margins = [], [], []
     for each in both.values():
-        median, most = (
-            1e3 * float(np.max(each.spread.errors.quantile("best", share))) for share in (0.5, 0.9)
-        )
-        known.append(f"{median:.0f} mN·m rms, in nine of ten machines below {most:.0f}")
+        known.append("not looked at" if each.spread is None else errors_in_words(each.spread.errors))
         followed.append(f"{100 * each.followed(32.0, 5.0).relative_error:.0f} % of a sine at 5 Hz, Kp 32")
-        margins.append(margins_in_words(each.evaluation.spread) if each.evaluation else "not looked at")
+        spread = None if each.evaluation is None else each.evaluation.spread
+        margins.append("not looked at" if spread is None else margins_in_words(spread))
     rows = (
         (
             "Which torque?", f"that of Fig. 8, the model within {numbers['fig8_rms_error_Nm']:.3f} N·m rms",
@@ -117,6 +124,12 @@ def answers(results: Results) -> TableSection:
     )  # fmt: skip
     caption = "What was designed, whether it can be made, and how well its torque is known and held."
     return TableSection("In brief", ("question", *both), rows, caption=caption)
+
+
+def errors_in_words(errors: SpreadErrors) -> str:
+    """Return the error of the generated observer in half and in nine of ten machines."""
+    median, most = (1e3 * float(np.max(errors.quantile("best", share))) for share in (0.5, 0.9))
+    return f"{median:.0f} mN·m rms, in nine of ten machines below {most:.0f}"
 
 
 def margins_in_words(margins: SpreadMargins) -> str:
@@ -135,7 +148,8 @@ def key_numbers(results: Results) -> Section:
     design, trimmed = (
         numbers["design_torque_error_mNm_rms"], numbers["design_quantile_after_trim_mNm_rms"]
     )  # fmt: skip
-    errors = results.designed.spread.errors
+    name, spread = list(results.over_spread.items())[-1]
+    errors = spread.errors
     exact, middle, paper = (
         1e3 * float(np.max(each))
         for each in (errors.exact[0], errors.quantile("best", 0.5), errors.quantile("published form", 0.5))
@@ -158,7 +172,7 @@ def key_numbers(results: Results) -> Section:
         ),
         KeyNumber(
             "torque observer", f"{middle:.0f} mN·m rms",
-            f"designed, median over the spread, published form → generated; with exact numbers {exact:.1f}",
+            f"{name}, median over the spread, published form → generated; with exact numbers {exact:.1f}",
             before=f"{paper:.0f}",
         ),
         KeyNumber(
@@ -170,26 +184,18 @@ def key_numbers(results: Results) -> Section:
     return NumbersSection("Key numbers", keys)
 
 
-def actuator_sections(results: Results) -> list[Section]:
-    """Show what was declared."""
-    actuator = results.published.actuator
-    return [
-        FoldedSection(
-            "What was declared",
-            (
-                TextSection(
-                    "Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)
-                ),
-                numbers_table("Numbers of the deck", actuator.quantities()),
-                EquationsSection(
-                    "Equations",
-                    nls.equations(results.published.model),
-                    "The flat model; `f(…)` stands for a long law.",
-                ),
-            ),
-            "Parts, numbers with unit, source and spread, and the equations of the published actuator",
-        )
+def actuator_section(published: ActuatorResults, *, fast: bool) -> Section:
+    """Show what was declared; the equations, which SymPy writes, where there is time."""
+    actuator = published.actuator
+    parts: list[Section] = [
+        TextSection("Parts", "The declaration, as `print(actuator)` draws it.", drawing=str(actuator)),
+        numbers_table("Numbers of the deck", actuator.quantities()),
     ]
+    if not fast:
+        words = "The flat model; `f(…)` stands for a long law."
+        parts.append(EquationsSection("Equations", nls.equations(published.model), words))
+    caption = "Parts, numbers with unit, source and spread, and the equations of the published actuator"
+    return FoldedSection("What was declared", tuple(parts), "" if fast else caption)
 
 
 def chapter_of_design(results: Results) -> list[Section]:
@@ -198,9 +204,8 @@ def chapter_of_design(results: Results) -> list[Section]:
     head = Chapter(
         "The spring, for the mechanical designer",
         "Contour, pretension, section and rest length of the rubber designed together for 5 N·m at 53°, the "
-        "curve of 2014. Curvature, cable tension, stress and strain are held by limits that follow from the "
-        "declared cable and rubber. Observer and torque loop are shown for both actuators: the `published` "
-        "one, and the `designed` one, which has this spring in the place of the published.",
+        "curve of 2014. Limits on curvature, cable tension, stress and strain follow from the declared cable "
+        "and rubber. The `designed` actuator is the `published` one with this spring.",
     )
     moved = CamSection(
         "Cam, cable and rubber",
@@ -211,8 +216,11 @@ def chapter_of_design(results: Results) -> list[Section]:
     )
     picture, torque, result, limits = design_sections(cam.design)
     made, band, tolerance, causes = tolerance_sections(cam.tolerance)
-    more = FoldedSection("More on the spring", (result, limits, picture, band, tolerance, causes))
-    return [head, moved, torque, made, drawing_section(cam), more]
+    drawings = drawing_section(cam)
+    more = FoldedSection(
+        "More on the spring", (result, limits, picture, made, band, tolerance, causes, drawings)
+    )
+    return [head, moved, torque, more]
 
 
 def figure_sections(figures: FigureComparison) -> list[Section]:
@@ -227,18 +235,18 @@ def figure_sections(figures: FigureComparison) -> list[Section]:
     }
     notes = dict(zip(curves, map(nls.figures.metric_note, (model, hooke)), strict=True))
     points = {"Fig. 8": (static.angle, static.measured)}
+    fig8 = FigureSection(
+        "Fig. 8: torque over angle",
+        nls.figures.torque_against_measured(curves, points, notes=notes),
+        caption="Points: measured. Lines: model with all relaxation at rest, and the best linear spring.",
+        assumed="The cam follows from this figure by energy: this checks the chain, not the law.",
+    )
     return [
         Chapter(
             "Model and measurement",
             "The published actuator; the points are read off the figures of the paper.",
         ),
-        FigureSection(
-            "Fig. 8: torque over angle",
-            nls.figures.torque_against_measured(curves, points, notes=notes),
-            caption="Points: measured. Lines: model with all relaxation at rest, and the best linear spring.",
-            assumed="The cam follows from this figure by energy: this checks the chain, not the law.",
-        ),
-        FoldedSection("More on model and measurement", more_on_figures(figures)),
+        FoldedSection("Against the figures of the paper", (fig8, *more_on_figures(figures))),
     ]
 
 
@@ -290,7 +298,8 @@ def file_sections(results: Results, out: Path) -> list[Section]:
                 source.source: f"{what} in C99, {name}",
                 source.selftest: f"its self-test with vectors, {name}",
             }
-        files |= dict.fromkeys(loop.fmus, f"co-simulation FMU, {name}")
+        if loop.cosimulated is not None:
+            files |= dict.fromkeys(loop.cosimulated.fmus, f"co-simulation FMU, {name}")
     for name, proved in results.proved.items():
         files |= {
             proved.code.source: f"certified observer in C99, {name}",

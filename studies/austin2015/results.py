@@ -37,7 +37,7 @@ class ActuatorResults:
     loop
         Generated code and the co-simulated torque loop.
     spread
-        Errors of the observers over the spread of the deck, and what is proved.
+        Errors of the observers over the spread of the deck, and what is proved, where that was computed.
     evaluation
         Verdicts, margins, impedance and onset of limit cycling of the torque loop, where it was judged.
     """
@@ -48,8 +48,13 @@ class ActuatorResults:
     observers: ObserverComparison
     following: tuple[Following, ...]
     loop: TorqueLoop
-    spread: ObserverOverSpread
+    spread: ObserverOverSpread | None
     evaluation: LoopEvaluation | None
+
+    @property
+    def generated(self) -> nls.FlatModel:
+        """The observer that is generated: with the least error over the spread, else the cascade."""
+        return self.spread.chosen.model if self.spread is not None else self.observers.minimal.model
 
     @property
     def rank_at_zero(self) -> float:
@@ -62,18 +67,23 @@ class ActuatorResults:
 
     @property
     def judged(self) -> dict[str, float]:
-        """What is proved, and how the torque loop was judged; nothing of what the fast way leaves out."""
-        numbers: dict[str, float] = {}
-        if self.spread.proved is not None:
-            proof = self.spread.proved.certificate.proof
-            numbers |= {"certified_decay_per_s": proof.decay, "certified_condition": proof.condition}
-        if self.evaluation is not None:
-            margins = self.evaluation.spread
+        """What is expected, proved, co-simulated and judged; nothing of what the fast way leaves out."""
+        numbers = self.loop.numbers
+        if self.spread is not None:
+            proof, expected = self.spread.proved.certificate.proof, self.spread.chosen.expected
             numbers |= {
-                "onset_of_limit_cycling_Kp": self.evaluation.onset.value,
-                "largest_Kp_with_margins": margins.enough,
-                "limit_cycling_after_kick_Kp_32_percent": 100.0 * margins.cycling,
+                "expected_over_spread_cascade_mNm_rms": 1e3 * expected[0],
+                "expected_over_spread_best_mNm_rms": 1e3 * min(expected),
+                "certified_decay_per_s": proof.decay,
+                "certified_condition": proof.condition,
             }
+        if self.evaluation is not None:
+            numbers["onset_of_limit_cycling_Kp"] = self.evaluation.onset.value
+            if (margins := self.evaluation.spread) is not None:
+                numbers |= {
+                    "largest_Kp_with_margins": margins.enough,
+                    "limit_cycling_after_kick_Kp_32_percent": 100.0 * margins.cycling,
+                }
         return numbers
 
 
@@ -110,8 +120,12 @@ class Results:
     @property
     def proved(self) -> dict[str, Proved]:
         """What is proved of each actuator, by its name."""
-        proved = {name: each.spread.proved for name, each in self.both.items()}
-        return {name: each for name, each in proved.items() if each is not None}
+        return {name: each.proved for name, each in self.over_spread.items()}
+
+    @property
+    def over_spread(self) -> dict[str, ObserverOverSpread]:
+        """Observers over the spread, by the name of the actuator: of the designed one the whole way only."""
+        return {name: each.spread for name, each in self.both.items() if each.spread is not None}
 
     @property
     def numbers(self) -> dict[str, float]:
@@ -129,14 +143,10 @@ class Results:
             "verdict_held_out_error_over_noise": self.verdict.held_out_ratio,
         }
         for name, each in self.both.items():
-            difference = float(np.max(np.abs(each.loop.difference)))
             numbers |= {
                 f"{name}_rank_at_zero": each.rank_at_zero,
-                f"{name}_cosimulation_difference_Nm": difference,
                 f"{name}_nominal_error_minimal_form_mNm_rms": 1e3 * each.observers.minimal_error,
                 f"{name}_nominal_error_published_form_mNm_rms": 1e3 * each.observers.published_error,
-                f"{name}_expected_over_spread_cascade_mNm_rms": 1e3 * each.spread.chosen.expected[0],
-                f"{name}_expected_over_spread_best_mNm_rms": 1e3 * min(each.spread.chosen.expected),
                 f"{name}_error_with_stiffer_rubber_mNm_rms": 1e3 * each.observers.stiffer_error,
                 **{f"{name}_{what}": number for what, number in each.judged.items()},
             }

@@ -56,17 +56,17 @@ class ObserverOverSpread:
     drops
         Angles at which a state is not seen.
     proved
-        What is proved of one gain for all angles; ``None`` where nothing was to be.
+        What is proved of one gain for all angles.
     """
 
     chosen: ObserverOfChoice
     errors: SpreadErrors
     drops: RankDrops
-    proved: Proved | None
+    proved: Proved
 
 
 def over_spread(
-    model: nls.FlatModel, observers: ObserverComparison, draws: int, *, proved: Proved | None
+    model: nls.FlatModel, observers: ObserverComparison, draws: int, *, proved: Proved
 ) -> ObserverOverSpread:
     """Compare the observers over the spread of a deck."""
     chosen = choose_observer(model)

@@ -12,7 +12,7 @@ import os
 import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import KW_ONLY, dataclass, field, replace
 from functools import lru_cache
 from html import escape
 from pathlib import Path
@@ -116,10 +116,11 @@ class PagePosition:
 
     key: str  # identifier that no other section of the page uses; identifiers inside start with it
     folder: Path  # folder of the report, for relative links
+    narrow: bool = True  # whether figures are drawn a second time, for a telephone and for paper
 
     def inner(self, number: int) -> PagePosition:
         """Return the place of a section inside this one."""
-        return PagePosition(f"{self.key}-{number}", self.folder)
+        return replace(self, key=f"{self.key}-{number}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -265,7 +266,8 @@ class FigureSection(Section):
         """Return the figure as inline SVG, drawn for a desk and for a telephone or paper, and its texts."""
         svg = Html(inline_svg(self.figure, place.key, alternative=self.alternative))
         narrow = Html("")
-        if "<a " not in svg:  # points that lead to their design stay on a figure that is moved sideways
+        # Points that lead to their design stay on a figure that is moved sideways.
+        if place.narrow and "<a " not in svg:
             small = for_telephone(self.figure)
             narrow = Html(inline_svg(small, f"{place.key}-narrow", alternative=self.alternative))
         data = data_link(self.figure, self.title) if self.data is None else file_link(self.data, place.folder)
@@ -430,8 +432,9 @@ _PAGE_TONES = {
 
 
 def write_report(
-    path: Path, *sections: Section, title: str, abstract: str = "", facts: Mapping[str, str] | None = None
-) -> Path:
+    path: Path, *sections: Section, title: str, abstract: str = "", facts: Mapping[str, str] | None = None,
+    narrow: bool = True,
+) -> Path:  # fmt: skip
     """Write a report and return its file, which appears whole or not at all.
 
     Parameters
@@ -446,6 +449,9 @@ def write_report(
         Paragraphs below the heading.
     facts
         Short texts by name for the line below, for instance the deck.
+    narrow
+        Whether each figure is drawn a second time, for a telephone and for paper, which takes more than half
+        of the time; without it figures are moved sideways there.
 
     Raises
     ------
@@ -455,7 +461,7 @@ def write_report(
         If there is no section.
     """
     path = Path(path)
-    text = report_text(path.parent, sections, title=title, abstract=abstract, facts=facts)
+    text = report_text(path.parent, sections, title=title, abstract=abstract, facts=facts, narrow=narrow)
     try:
         write_text(path, text)
     except OSError as error:
@@ -472,13 +478,14 @@ def report_text(
     title: str,
     abstract: str = "",
     facts: Mapping[str, str] | None = None,
+    narrow: bool = True,
 ) -> str:
     """Return a report as text; the same for the same sections."""
     pieces = list(sections)
     if not pieces:
         raise ValueRangeError("report", "has no section", next_step="give write_report at least one")
     entries, inside = [], False
-    places = [PagePosition(f"s{number}", folder) for number in range(1, len(pieces) + 1)]
+    places = [PagePosition(f"s{number}", folder, narrow) for number in range(1, len(pieces) + 1)]
     # Drawing the figures takes the time, so each core draws some of them.
     contents = parallel_map(lambda k: pieces[k].content(places[k]), len(pieces))
     for section, place, content in zip(pieces, places, contents, strict=True):

@@ -49,15 +49,9 @@ def commands() -> list[tuple[str, ...]]:
     return [(name, *below) for name, group in inner.items() for below in [(), *((one,) for one in group)]]
 
 
-@pytest.mark.parametrize("option", ["--help", "--version"])
-def test_the_program_itself_loads_no_library(loaded: Loaded, option: str) -> None:
-    modules, shown = loaded(COMMAND.format(words=[option]))
-    assert "nlsdesign" in shown
-    assert "click" in modules
-    assert not modules & HEAVY
-
-
-LISTS = {
+SHOWN = {
+    ("--help",): "Design workbench",
+    ("--version",): "nlsdesign",
     ("study", "list"): "austin2015",
     ("deck", "list"): "austin2015",
     ("parts",): "CoulombFriction",
@@ -66,30 +60,24 @@ LISTS = {
 }
 
 
-@pytest.mark.parametrize("words", LISTS, ids=" ".join)
-def test_a_list_of_what_comes_with_the_project_loads_no_library(
-    loaded: Loaded, words: tuple[str, ...]
-) -> None:
-    modules, shown = loaded(COMMAND.format(words=words))
-    assert LISTS[words] in shown
-    assert not modules & HEAVY
-
-
-def test_help_of_every_command_loads_no_library(loaded: Loaded) -> None:
+def test_lists_and_the_help_of_every_command_load_no_library(loaded: Loaded) -> None:
+    """One process asks for all, as each takes a third of a second to begin; it names who loads a library."""
     asked = commands()
     assert {("deck", "check"), ("export", "fmu"), ("study", "run"), ("diagnose",)} <= set(asked)
+    wanted = SHOWN | {(*words, "--help"): "Usage:" for words in asked}
     modules, shown = loaded(
         f"""
 from click.testing import CliRunner
 from nlsdesign.cli.main import program
-for words in {asked!r}:
-    shown = CliRunner().invoke(program, [*words, "--help"])
-    assert shown.exit_code == 0, shown.output
-    print(shown.output)
+for words, part in {wanted!r}.items():
+    done = CliRunner().invoke(program, words)
+    assert done.exit_code == 0 and part in done.output, (words, done.output)
+    assert not (late := {HEAVY!r} & set(sys.modules)), (words, late)
+print(len({wanted!r}))
 """
     )
-    assert shown.count("Usage:") == len(asked)
-    assert not modules & HEAVY
+    assert "click" in modules
+    assert int(shown) == len(wanted) > 40
 
 
 def test_completion_in_the_shell_loads_no_library(loaded: Loaded) -> None:

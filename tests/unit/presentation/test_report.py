@@ -32,6 +32,7 @@ from nlsdesign.presentation.report.diagnosis_sections import VerdictSection
 from nlsdesign.presentation.report.mathml import formula
 from nlsdesign.presentation.report.sections import prose, report_text, words
 from tests import figure_samples as samples
+from tests.undrawn import without_drawing
 
 EVIL = "\"'><img src=x onerror=alert(1)><script>alert(2)</script>&amp;"
 VOID = {"meta", "link", "input", "br", "hr", "img", "wbr"}
@@ -523,3 +524,13 @@ def test_a_report_on_a_diagnosis_has_units_on_every_axis() -> None:
     assert labels == ["", "time in s", "load.angle in rad", "speed of the motion in rad/s"]
     for figure in drawn:
         assert [axes.get_ylabel().endswith(" in N·m") for axes in figure.axes] == [True] * len(figure.axes)
+
+
+def test_figures_for_a_telephone_can_be_left_out_folded_ones_too(tmp_path: Path) -> None:
+    figure = report.FigureSection("F", samples.FIGURES["gap_bars"](), caption="c")
+    sections = (figure, report.FoldedSection("More", (figure,)))
+    with without_drawing():
+        both, desk = (report_text(tmp_path, sections, title="t", narrow=each) for each in (True, False))
+    assert [text.count('<div class="drawing narrow">') for text in (both, desk)] == [2, 0]
+    assert [text.count('<div class="drawing wide"') for text in (both, desk)] == [2, 0]
+    assert [text.count("<figure") for text in (both, desk)] == [2, 2]

@@ -118,7 +118,6 @@ def choose_observer(
     cascade = design_observer_with_details(
         model, estimate=estimate, measured=measured, sample_time=sample_time, grid=grid
     )
-    plain = with_alarm(cascade, model)
     estimate, measured = spring_torque(model, estimate), measured_motion(model, measured)
     unit = typeset_unit(model.variable(estimate).unit)
     try:
@@ -128,13 +127,15 @@ def choose_observer(
         learned = expected_error(model, learning, duty)
     except (ArrangementError, ValueRangeError, ConvergenceError) as error:
         # Without spreads, an encoder or a drive there is nothing to learn from: the reason is handed on.
-        return ObserverOfChoice(plain, f"cascade, for it cannot be corrected: {error}", ())
+        reason = f"cascade, for it cannot be corrected: {error}"
+        return ObserverOfChoice(with_alarm(cascade, model), reason, ())
     alone = learning.balance.before
     sizes = f"{prefixed(learned, unit)} against {prefixed(alone, unit)} rms"
     both = f"expected over the spread {sizes} of the cascade"
     if learned < alone:
         return ObserverOfChoice(learning, f"corrected: {both}", (alone, learned))
-    return ObserverOfChoice(plain, f"cascade: the corrected one has {both}", (alone, learned))
+    reason = f"cascade: the corrected one has {both}"
+    return ObserverOfChoice(with_alarm(cascade, model), reason, (alone, learned))
 
 
 def expected_error(model: FlatModel, design: CorrectedDesign, duty: Duty | None) -> float:
