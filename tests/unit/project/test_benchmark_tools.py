@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -26,6 +27,19 @@ NATIVE = """
 __attribute__((visibility("default"))) int portable(void);
 int portable(void) { return 1; }
 """
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_the_observer_by_hand_has_the_guards_of_the_generated_one(tmp_path):
+    """Once it had those of an earlier state, and the ratio of instructions compared two observers."""
+    observer_step.prepare(tmp_path)
+    sides = [
+        run_tool([str(observer_step.compiled(tmp_path, ["gcc"], side, guarded=True))]).stdout.split()
+        for side in ("by_hand", "generated")
+    ]
+    (by_hand, words), (generated, expected) = sides
+    assert float(by_hand) == pytest.approx(float(generated), rel=1e-9)
+    assert words == expected
 
 
 @pytest.mark.parametrize("compiler", observer_step.compilers())
