@@ -51,7 +51,14 @@ class EmulatedBoard:
         path = Path(self._folder.name) / "gdb"
         self._emulator = subprocess.Popen(
             [
-                *(EMULATOR, "-machine", processor.machine, "-icount", f"shift={shift},sleep=off", "-nographic"),
+                *(
+                    EMULATOR,
+                    "-machine",
+                    processor.machine,
+                    "-icount",
+                    f"shift={shift},sleep=off",
+                    "-nographic",
+                ),
                 *("-monitor", "none", "-serial", "none", "-S", "-kernel", str(image)),
                 *("-chardev", f"socket,path={path},server=on,wait=off,id=gdb", "-gdb", "chardev:gdb"),
             ],

@@ -202,7 +202,10 @@ def run_both(firmware: Firmware, processor: Processor, samples: int, folder: Pat
     plants = [Unit(firmware.plant, folder / str(k)) for k in range(2)]
     currents = [0.0, 0.0]
     differing, first, cycles, torques, misses = 0, -1, [], [], []
-    with EmulatedBoard(firmware.image, processor, firmware.shift) as board, reference(firmware, folder) as step:
+    with (
+        EmulatedBoard(firmware.image, processor, firmware.shift) as board,
+        reference(firmware, folder) as step,
+    ):
         for k in range(samples):
             cells = board.sample(firmware.counts(plants[0]), wish(k))
             expected = step(firmware.counts(plants[1]), wish(k))

@@ -1,9 +1,9 @@
 """Instructions of one observer step: generated C against C written by hand, counted by callgrind.
 
 The observer has four states, two measured quantities and one table over the angle. Both are compiled by the
-same compiler with the same flags and fed the same inputs; their outputs and status words must agree. Guards (a
-reading that can be true or what is expected, a command within its range, states and outputs finite) are in both
-or in neither; their cost is the difference between the lines.
+same compiler with the same flags and fed the same inputs; their outputs and status words must agree. Guards
+(a reading that can be true or what is expected, a command within its range, states and outputs finite) are in
+both or in neither; their cost is the difference between the lines.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def model() -> FlatModel:
 
 
 def drivers(source: CSource) -> dict[str, str]:
-    """One main program for each side; the inputs visit the whole table, and BAD ones every guard of a reading."""
+    """One main program for each side; the inputs visit the whole table, BAD ones every guard of a reading."""
     shared = f"""
         #include <math.h>
         #include <stdio.h>
@@ -109,7 +109,9 @@ def without_guards(text: str) -> str:
     text, begins = re.subn(r" && state->readings\[0\]\.seen != 0u", "", text)
     text, checks = re.subn(r"if \(\(.* >= 0\.0\) \{", "if (1) {", text)
     assert (inputs, begins, checks) == (2, 1, 2)
-    return re.sub(r"/\* Keeps one command.*?\n}\n|static const reading_limits .*?\n}\n", "", text, flags=re.DOTALL)
+    return re.sub(
+        r"/\* Keeps one command.*?\n}\n|static const reading_limits .*?\n}\n", "", text, flags=re.DOTALL
+    )
 
 
 def prepare(folder: Path) -> None:
