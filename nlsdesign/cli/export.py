@@ -58,6 +58,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
             "_example_link.c",
             "_play.py",
             ".mk",
+            ".gdb",
         )
         if given["examples"]
         else ()

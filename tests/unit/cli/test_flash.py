@@ -128,7 +128,7 @@ def test_a_step_that_takes_more_than_its_share_is_refused_with_its_count(
     assert sentence.startswith(
         "instructions on a Cortex-M4F: 434, at most 629, 7.86 % of a sample of 1 ms at 8 MHz"
     )
-    with pytest.raises(ValueRangeError, match=r"budget of 7 %.*takes 629 instructions on a Cortex-M4F, 7.86 %"):
+    with pytest.raises(ValueRangeError, match=r"budget of 7 %.*takes 629 instructions.*, 7.86 %"):
         require_time(observer(), "float", share=0.07, clock=8e6)
     cost.run, cost.reason = None, "qemu-system-arm is not installed"
     with pytest.raises(
