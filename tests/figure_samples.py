@@ -306,3 +306,9 @@ FIGURES: dict[str, Callable[[], figures.Figure]] = {
     "sensitivity_bars": shares,
     "answers_against": front_of_sweep,
 }
+
+
+@functools.cache
+def drawn(name: str) -> figures.Figure:
+    """Draw a sample, once for all tests of a process; nobody changes it."""
+    return FIGURES[name]()

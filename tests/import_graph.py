@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from tests.source import parse
+from tests.source import children, parse
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ def _importing(tree: ast.Module) -> tuple[tuple[ast.AST, bool], ...]:
         if isinstance(node, ast.Import | ast.ImportFrom | ast.Call):
             result.append((node, lazy))
         inside = lazy or isinstance(node, functions)
-        waiting.extend((child, inside) for child in ast.iter_child_nodes(node))
+        waiting.extend((child, inside) for child in children(node))
     return tuple(result)
 
 

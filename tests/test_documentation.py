@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import inspect
 import re
@@ -85,6 +86,8 @@ def unproven_claims(text: str, root: Path) -> Iterator[str]:
 def machine_paths(name: str, text: str) -> Iterator[str]:
     """Paths of somebody's machine; in tests a literal below the system's scratch folder may be an example."""
     patterns = [MACHINE] if name.startswith("tests/") else [MACHINE, SCRATCH]
+    if not any(pattern.search(text) for pattern in patterns):
+        return
     for number, line in enumerate(text.splitlines(), start=1):
         if any(pattern.search(line) for pattern in patterns):
             yield f"{name}, line {number}: {line.strip()[:100]}"
@@ -106,6 +109,7 @@ def test_everything_public_is_typed(root: Path) -> None:
     expect_none(root, public_files(root), source.untyped)
 
 
+@functools.cache
 def exported(root: Path) -> dict[Path, set[str]]:
     """Functions and classes that users are offered, by file.
 

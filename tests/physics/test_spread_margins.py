@@ -177,6 +177,7 @@ def test_a_gain_that_nobody_gave_is_lowered_to_one_with_a_margin_and_a_given_one
     assert lowered.values[GAIN] == pytest.approx(14.2, abs=0.3)
 
 
+@pytest.mark.slow
 def test_behind_a_delay_both_loops_are_slowed_until_there_is_a_margin(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

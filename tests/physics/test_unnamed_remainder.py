@@ -111,6 +111,7 @@ def test_nothing_is_added_to_noise() -> None:
     assert made.part("spring") is None
 
 
+@pytest.mark.slow
 def test_the_table_lies_where_the_cam_rubs_and_is_as_high() -> None:
     made = case("arm", "rubbing_spot")
     candidate = made.part("motor")

@@ -455,6 +455,7 @@ def _evidence(step: Step, standing: Standing) -> EffectEvidence:
         worst,
         0.5 * step.gains[worst] if worst else math.nan,
         next_leaves=math.exp(step.distance),
+        next_name=step.next_name,
     )
 
 

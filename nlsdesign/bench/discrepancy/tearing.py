@@ -215,19 +215,34 @@ def _effort_at_standstill(terms: BalanceTerms, reading: Expression) -> Expressio
 def _states_behind(terms: BalanceTerms, reading: Expression) -> list[int]:
     """Return the states through which a drive reaches its effort, as that of a winding.
 
-    One that a drive moves by its square alone, such as the heat of a winding, passes nothing on: it changes
-    what the drive gives, and is no part of it.
+    One that a drive of either sign moves to the same side, such as the heat of a winding, passes nothing on:
+    it changes what the drive gives, and is no part of it.
     """
     reached: list[int] = []
     frontier: list[Expression] = [reading]
     while frontier:
         symbol = frontier.pop()
         for i in range(terms.state.numel()):
-            at_zero = ca.substitute(ca.jacobian(terms.derivative[i], symbol), symbol, ca.SX(0))
-            if i not in reached and not ca.simplify(at_zero).is_zero():
+            if i not in reached and _passed_on(terms, symbol, terms.derivative[i]):
                 reached.append(i)
                 frontier.append(terms.state[i])
     return sorted(reached)
+
+
+_OF_EITHER_SIGN = np.outer([-1.0, 1.0], 10.0 ** np.arange(-6, 7)).ravel()
+"""Values, in SI, at which it is asked which way something moves: one sign only counts beyond any bias."""
+
+
+def _passed_on(terms: BalanceTerms, symbol: Expression, rate: Expression) -> bool:
+    """Tell whether a rate follows a symbol, all else at zero, the same way for either sign of that symbol."""
+    slope = ca.jacobian(rate, symbol)
+    if slope.nnz() == 0:
+        return False
+    others = [s for s in ca.vertsplit(ca.vertcat(terms.readings, terms.state)) if s.name() != symbol.name()]
+    alone = ca.substitute(slope, ca.vertcat(*others), ca.SX.zeros(len(others)))
+    slopes = ca.Function("slope", [symbol, terms.parameter], [ca.densify(alone)])
+    signs = np.sign(slopes(_OF_EITHER_SIGN[None, :], terms.declared).full())
+    return bool(np.any(signs > 0.0) != np.any(signs < 0.0))
 
 
 def _declared(terms: BalanceTerms, value: Expression) -> float:

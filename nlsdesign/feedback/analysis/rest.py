@@ -18,6 +18,7 @@ from ...model import FlatModel
 from ...model.flat import Symbols
 from ...model.roles import measured_motion
 from ...model.transform import named
+from ...simulation.buffered import Buffered
 
 
 def rate_state(model: FlatModel, angle: str, s: Symbols | None = None) -> str:
@@ -151,15 +152,18 @@ def evaluate_rows(function: ca.Function, x: Array, u: Array, p: Array) -> list[A
     ``x``: shape (n, states). ``u``: shape (inputs,), the same for all, or (n, inputs).
     """
     count = len(x)
-    if u.ndim == 2:
-        results = _mapped(function, count, (0, 3)).call([0.0, x.T, u.T, p])
-    else:
-        results = _mapped(function, count, (0, 2, 3)).call([0.0, x.T, u, p])
+    mapped = _mapped(function, count, (0, 3) if u.ndim == 2 else (0, 2, 3))
+    # A matrix with a column for each row is that row after row.
+    given = [np.ascontiguousarray(each, dtype=np.float64) for each in (np.zeros(1), x, u, p)]
+    call = Buffered(mapped, given)
+    call.evaluate()
     rows = []
-    for i, result in enumerate(results):
+    for i, values in enumerate(call.results):
+        down, across = function.sparsity_out(i).get_triplet()
         wide = function.size2_out(i)
-        dense = np.array(result).reshape(function.size1_out(i), count, wide)
-        rows.append(np.ascontiguousarray(dense.transpose(1, 0, 2).reshape(count, -1)))
+        dense = np.zeros((count, function.size1_out(i) * wide))
+        dense[:, np.array(down, int) * wide + np.array(across, int)] = values.reshape(count, len(down))
+        rows.append(dense)
     return rows
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import functools
 import os
 import re
 import xml.etree.ElementTree as ET
@@ -28,6 +27,7 @@ from nlsdesign.presentation.figures.style import SERIES, TONES, alternative_text
 from nlsdesign.presentation.figures.svg import svg_text, thinned
 from nlsdesign.presentation.figures.telephone import for_telephone
 from tests import figure_samples as samples
+from tests.figure_samples import drawn
 from tests.selection import quick_only
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -40,11 +40,6 @@ def no_window() -> Iterator[None]:
     yield
     assert pyplot.get_fignums() == []
     assert dict(mpl.rcParams) == before
-
-
-@functools.cache
-def drawn(name: str) -> figures.Figure:
-    return samples.FIGURES[name]()
 
 
 # --- every figure ---------------------------------------------------------------------------------
@@ -78,7 +73,7 @@ def test_a_figure_has_words_labels_and_units(name: str) -> None:
 
 
 # Of each kind, for most other tests leave the figures of their pages blank: tests/undrawn.py.
-@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::3]))
+@pytest.mark.parametrize("name", quick_only(samples.FIGURES, list(samples.FIGURES)[::5]))
 def test_an_inline_figure_fits_into_any_page(name: str) -> None:
     figure = drawn(name)
     root = ET.fromstring(figures.inline_svg(figure, "k7"))

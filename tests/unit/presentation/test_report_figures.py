@@ -33,7 +33,7 @@ PICTURES = {"cam_positions"}
 
 @pytest.mark.parametrize("name", sorted(set(samples.FIGURES) - PICTURES))
 def test_every_axis_of_numbers_has_a_unit(name: str) -> None:
-    figure = samples.FIGURES[name]()
+    figure = samples.drawn(name)
     for axes in figure.axes:
         across = next(
             (a.get_xlabel() for a in axes.get_shared_x_axes().get_siblings(axes) if a.get_xlabel()), ""
@@ -76,11 +76,11 @@ def colour_of(figure: Figure, label: str) -> str:
     ],
 )
 def test_a_colour_means_the_same_in_every_figure(name: str, label: str, tone: object) -> None:
-    assert colour_of(samples.FIGURES[name](), label) == str(tone)
+    assert colour_of(samples.drawn(name), label) == str(tone)
 
 
 def test_made_springs_go_from_before_to_after() -> None:
-    bars = samples.FIGURES["tolerance_bars"]().axes[0].containers[0]
+    bars = samples.drawn("tolerance_bars").axes[0].containers[0]
     built, trimmed = (to_hex(bar.get_facecolor()) for bar in bars.patches[:2])
     assert (built, trimmed) == (BEFORE.light, AFTER.light)
 

@@ -146,10 +146,12 @@ def _eccentric_disc(assembly: Assembly, name: str) -> Iterator[Edit]:
         zero, largest = number(0.0, "rad"), 0.2 / max(order.number, 1.0)
         disc = Eccentricity(of=encoder.of, sine=zero, cosine=zero, order=order)
         edited, fault = _with_fault(assembly, name, "eccentricity", disc)
-        yield Edit(
-            edited,
-            tuple(Unknown(f"{fault}.{part}", (0.0,), -largest, largest) for part in ("sine", "cosine")),
-        )
+        size = tuple(Unknown(f"{fault}.{part}", (0.0,), -largest, largest) for part in ("sine", "cosine"))
+        yield Edit(edited, size)
+        # Beside another encoder it shows where it was set to zero: not always where the machine is at zero.
+        if name in _against_others(EncoderOffset)(edited):
+            for zeroed in _zero(edited, name):
+                yield Edit(zeroed.assembly, (*size, replace(zeroed.unknowns[0], null=None)))
 
 
 def _disc_orders(assembly: Assembly, measured: str) -> list[Quantity]:

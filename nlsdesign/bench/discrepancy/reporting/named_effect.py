@@ -34,9 +34,10 @@ class EffectEvidence:
     # over_simpler: the simpler forms of the effect: identifier, log-likelihood that is lost with that form in
     # its place, and its standard error
     over_simpler: tuple[tuple[str, float, float], ...] = ()
-    # next_leaves: how many times as much of the excess the best other name leaves, with the noise margin on
-    # both sides
+    # next_leaves, next_name: how many times as much of the excess the best other name leaves, with the noise
+    # margin on both sides, and its identifier
     next_leaves: float = math.nan
+    next_name: str = ""
 
     def words(self) -> str:
         """Return the evidence in sentences."""
@@ -51,7 +52,8 @@ class EffectEvidence:
             text += f" The record that gains least is '{self.worst_record}': there it "
             text += f"falls by {change}." if self.worst_change >= 0.0 else f"rises by {change}."
         if math.isfinite(self.next_leaves):
-            text += f" The best other name leaves {three_digits(self.next_leaves)} times as much."
+            other = f", {title(self.next_name)}," if self.next_name else ""
+            text += f" The best other name{other} leaves {three_digits(self.next_leaves)} times as much."
         return " ".join([text, *(self._over(*each) for each in self.over_simpler)])
 
     def _over(self, simpler: str, cost: float, error: float) -> str:

@@ -412,12 +412,15 @@ class Calibration:
 CALIBRATION = Calibration()
 
 
-def distance_to_next(criteria: Criteria, choice: Choice[T], rivals: Sequence[Rival[T]], block: str) -> float:
-    """Return ln(r): how many times as much the best other name leaves as the one that is taken."""
+def next_name(
+    criteria: Criteria, choice: Choice[T], rivals: Sequence[Rival[T]], block: str
+) -> tuple[float, str]:
+    """Return ln(r), how many times as much as the one that is taken the best other name leaves, and it."""
     names = {choice.taken.effect, *(each.effect for each in choice.equals), *choice.taken.simpler}
     # A form that contains it is no other name for what is there.
     forms = {rival.effect for rival in rivals if choice.taken.effect in rival.simpler}
-    others = [rival.left_in(block) for rival in rivals if rival.effect not in names | forms]
-    margin = criteria.noise_margin
-    own = choice.taken.left_in(block)
-    return math.log((min(others) + margin) / (own + margin)) if others else 0.0
+    others = [rival for rival in rivals if rival.effect not in names | forms]
+    if not others:
+        return 0.0, ""
+    best, margin = min(others, key=lambda rival: rival.left_in(block)), criteria.noise_margin
+    return math.log((best.left_in(block) + margin) / (choice.taken.left_in(block) + margin)), best.effect

@@ -183,7 +183,9 @@ class Revision:
                 return []
             rival = rival_of(later, self.trials.excesses_of(later))
             made = self.trials.made(self.trials.excesses_of(present), rival, step.block)
-            rebuilt.append(replace(made, distance=step.distance, equals=step.equals))
+            rebuilt.append(
+                replace(made, distance=step.distance, next_name=step.next_name, equals=step.equals)
+            )
             present = later
         return rebuilt
 
@@ -452,7 +454,10 @@ class _Search:
         equals = (step.chosen,) if alike else ()
         (alone,) = {one for one, _ in tasks if one.newest.effect == pair.chosen.added[-2].effect}
         first = self.trials.made(before, rival_of(alone, self.trials.excesses_of(alone)), block)
-        return [replace(each, distance=step.distance, equals=equals) for each in (first, pair)]
+        return [
+            replace(each, distance=step.distance, next_name=step.next_name, equals=equals)
+            for each in (first, pair)
+        ]
 
     def _pair(self, tried: Sequence[Hypothesis], present: Hypothesis, block: str) -> list[Step]:
         """Return two effects that help together where none helps alone."""

@@ -11,7 +11,7 @@ from ....foundation.work_sharing import parallel_map
 from ....model.structure import MovingBody
 from ..effects.effect import Candidate, EffectFunction
 from .comparison import Comparison
-from .criteria import Change, Criteria, Rival, choose, distance_to_next, imitates
+from .criteria import Change, Criteria, Rival, choose, imitates, next_name
 from .hypothesis import Hypothesis, excesses
 from .measures import DECLARED, Excesses, Gain, explained, gain, gains_by_record, standing_of, total_excess
 
@@ -27,7 +27,9 @@ class Step:
     chosen: Hypothesis  # hypothesis with the effect in it
     block: str  # of whose excess it explains most
     share: float  # that share of what was left there before
-    distance: float = 0.0  # how many times as much the best other name leaves, natural logarithm
+    # distance, next_name: how many times as much the best other name leaves, natural logarithm; that name
+    distance: float = 0.0
+    next_name: str = ""
     # gain, gains: what prediction gains by it, over all records and on each
     gain: Gain = _UNKNOWN_GAIN
     gains: Mapping[str, float] = field(default_factory=dict)
@@ -224,9 +226,11 @@ class Trials:
         choice = choose(self.criteria, before, rivals, block)
         if choice is None:
             return None
+        distance, name = next_name(self.criteria, choice, rivals, block)
         return replace(
             self.made(before, choice.taken, block),
-            distance=distance_to_next(self.criteria, choice, rivals, block),
+            distance=distance,
+            next_name=name,
             equals=tuple(r.hypothesis for r in choice.equals),
         )
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import casadi as ca
 import numpy as np
@@ -126,15 +127,18 @@ def push(form: AngleForm) -> tuple[float, int | None]:
 
     Result: slope, and place among the inputs of the model; ``None`` where no input moves the body.
     """
-    driven, rows = form.driven()
-    if form.speed not in rows:
-        return 0.0, None
-    u = ca.SX.sym("u", len(form.free_inputs))
-    slopes = ca.Function("slopes", [u], [ca.jacobian(ca.SX(driven(u)), u)])
-    start = np.array([form.u[i] for i in form.free_inputs])
-    row = slopes(start).full()[rows.index(form.speed)]
+    slopes = _slopes_of_inputs(form.rates_and_estimate)
+    at_rest = evaluate_rows(slopes, form.rest_in_model_order(np.zeros(1)), form.u, form.p)[0]
+    row = at_rest.reshape(-1, len(form.u))[form.speed, form.free_inputs]
     moving = np.flatnonzero(row)
     return (float(row[moving[0]]), form.free_inputs[int(moving[0])]) if len(moving) else (0.0, None)
+
+
+@lru_cache(maxsize=32)
+def _slopes_of_inputs(rates: ca.Function) -> ca.Function:
+    """Return the slopes of the rates in the inputs, as a function of the same arguments."""
+    arguments = [rates.sx_in(i) for i in range(4)]
+    return ca.Function("slopes", arguments, [ca.jacobian(rates.call(arguments)[0], arguments[2])])
 
 
 STEP = 0.5

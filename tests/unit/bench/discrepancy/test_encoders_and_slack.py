@@ -6,6 +6,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from benchmarks._score_run import opened
@@ -40,6 +41,22 @@ def test_an_eccentric_disc_is_told_at_its_own_encoder(seed: int, condition: str,
     )
     assert verdict.complete
     assert condition == "coarse" or disc.aliases == ()
+
+
+@pytest.mark.slow
+def test_an_eccentric_disc_that_was_set_to_zero_elsewhere_has_a_zero_of_its_own(tmp_path: Path) -> None:
+    """Its error vanishes where the encoder was set to zero, not where the machine is at zero."""
+    write_kind_case(tmp_path, "elastic_joint", ("joint_eccentricity",), 1.0, 1196, condition="plain")
+    names = names_of("elastic_joint", 1196)
+    for file in tmp_path.glob("*.csv"):
+        head, rows = file.read_text().partition("\n")[0], np.loadtxt(file, delimiter=",", skiprows=1)
+        rows[:, head.split(",").index(names["load_place"])] += 0.01
+        np.savetxt(file, rows, "%.9g", ",", header=head, comments="")
+    rivals = effects.angle_sensor_eccentricity, effects.gravity_load
+    (disc,) = diagnose(*opened(tmp_path), catalogue=rivals).effects
+    assert (disc.name, disc.location) == ("angle_sensor_eccentricity", names["load_encoder"])
+    (offset,) = [each for name, each in disc.parameters.items() if name.endswith(".offset")]
+    assert offset[0] == pytest.approx(0.01, abs=3.0 * offset[2])
 
 
 @pytest.mark.slow

@@ -17,6 +17,7 @@ from nlsdesign.components import (
     ROTATION,
     Assembly,
     CurrentDrivenMotor,
+    CurrentSensor,
     Dashpot,
     Eccentricity,
     Encoder,
@@ -182,15 +183,22 @@ def remaining(block: Block, record: Record) -> float:
     return float(np.sqrt(np.mean((smoothing(len(TIME), WIDTH, 5) @ error) ** 2)))
 
 
-def test_a_drive_that_grows_warm_is_not_judged_by_what_it_would_give_once_warm() -> None:
-    """A wrong damping is as large as it is: at 8 A the steady torque I/(1 + (I/4 A)²) falls with current."""
+@pytest.mark.parametrize("bias", [None, 0.0, 0.5])
+def test_a_drive_that_grows_warm_is_not_judged_by_what_it_would_give_once_warm(bias: float | None) -> None:
+    """A wrong damping is as large as it is: at 8 A the steady torque I/(1 + (I/4 A)²) falls with current.
+
+    An ammeter with a bias shows zero where a current flows, which warms the drive too.
+    """
     heat = WindingHeat(halving=4.0, cooling_time=3.0)
     motor = CurrentDrivenMotor(
         inertia=1e-3, torque_constant=0.1, resistance=0.5, current_limit=99.0, voltage_limit=1e4,
         chain=(("heat", heat),),
     )  # fmt: skip
     bearing = tie(Dashpot(damping=Quantity(0.02, "N*m*s/rad")), "motor")
-    made = assembly("warm", motor=motor, bearing=bearing)
+    sensors = {} if bias is None else {"ammeter": CurrentSensor(of="motor.current", noise=0.0, bias=bias)}
+    made, signal = assembly("warm", motor=motor, bearing=bearing, **sensors), "ammeter.reading"
+    if bias is None:
+        signal = "motor.current"
     current = 8.0 * np.sin(2.0 * np.pi * 1.5 * TIME)
     run = simulate(
         flatten(made, outputs=["motor.angle", "motor.speed"]), TIME,
@@ -198,9 +206,9 @@ def test_a_drive_that_grows_warm_is_not_judged_by_what_it_would_give_once_warm()
     )  # fmt: skip
     speed = run["motor.speed"]
     record = Record(
-        "run", replace(run, signals={"motor.angle": run["motor.angle"], "motor.current": current})
+        "run", replace(run, signals={"motor.angle": run["motor.angle"], signal: current + (bias or 0.0)})
     )
-    (block,) = blocks_of(flatten(made), ("motor.angle", "motor.current"))
+    (block,) = blocks_of(flatten(made), ("motor.angle", signal))
     driven = DrivenBlock(block, ["bearing.damping"], records=[record])
     wrong = {"bearing.damping": 0.05}
     left = driven.respond(driven.samples(record, wrong), wrong).output

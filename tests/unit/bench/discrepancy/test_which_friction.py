@@ -31,7 +31,7 @@ def falling(rate: float, angle: float, load: float) -> float:
 
 
 @pytest.mark.long_cases("motor")
-@pytest.mark.parametrize("body", ["motor", "joint"])
+@pytest.mark.parametrize("body", ["motor", pytest.param("joint", marks=pytest.mark.slow)])
 def test_sharp_friction_in_slow_motion_is_coulombs(body: str, tmp_path: Path) -> None:
     """A sign that is rounded more than the records resolve is sharpened by a Stribeck speed below it."""
     level: Level = lambda rate, angle, load: 0.12  # noqa: E731
