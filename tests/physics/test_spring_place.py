@@ -98,7 +98,7 @@ def test_the_motor_beside_the_spring_gives_what_the_spring_does_not(joint: str) 
 
 
 @pytest.mark.long_cases("False")
-@pytest.mark.parametrize("both_ways", [False, True])
+@pytest.mark.parametrize("both_ways", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_no_spring_beside_the_drive_gets_below_the_bound(both_ways: bool) -> None:
     curve, random = beside("ankle", both_ways), np.random.default_rng(2)
     assert curve.bound == pytest.approx(curve.best.energy, abs=2e-4 * curve.best.heat)

@@ -229,6 +229,18 @@ def _states_behind(terms: BalanceTerms, reading: Expression) -> list[int]:
     return sorted(reached)
 
 
+def _warmed(terms: BalanceTerms, drives: Sequence[Expression]) -> list[int]:
+    """Return the states that a drive of either sign moves to the same side: a winding that grows warm.
+
+    They begin cold: how warm a drive was before a record nobody knows, and what it holds at the first sample
+    it need not have held for long.
+    """
+    behind = {i for reading in drives for i in _states_behind(terms, reading)}
+    moving = [*drives, *[terms.state[i] for i in behind]]
+    others = set(range(terms.state.numel())) - behind - set(_clocks(terms))
+    return [i for i in sorted(others) if any(ca.depends_on(terms.derivative[i], each) for each in moving)]
+
+
 _OF_EITHER_SIGN = np.outer([-1.0, 1.0], 10.0 ** np.arange(-6, 7)).ravel()
 """Values, in SI, at which it is asked which way something moves: one sign only counts beyond any bias."""
 
@@ -522,7 +534,7 @@ class _Tearing:
         derivative, value, signal = self._in_readings(
             [_column(s.derivative, kept), result.value, _column(s.signal, bounded)]
         )
-        value, per_drive = self._scaled(value, derivative, kept, body)
+        value, per_drive, cold = self._scaled(value, derivative, kept, body)
         driven = ca.vertcat(*[symbol for _, symbol in self._inputs.values()])
         columns = [
             s.time,
@@ -548,6 +560,7 @@ class _Tearing:
             target=result.target,
             moving=result.moving,
             effort_per_drive=per_drive,
+            cold=tuple(model.states[kept[i]].name for i in cold),
         )
 
     def _in_readings(self, rows: list[Expression]) -> list[Expression]:
@@ -562,10 +575,10 @@ class _Tearing:
 
     def _scaled(
         self, value: Expression, derivative: Expression, kept: Sequence[int], body: MovingBody | None
-    ) -> tuple[Expression, float]:
-        """Return a balance in the scale of what was measured, and the declared effort per unit of that."""
+    ) -> tuple[Expression, float, list[int]]:
+        """Return a balance in the scale of what was measured, the effort per unit, and what grows warm."""
         if body is None:
-            return value, 1.0
+            return value, 1.0, []
         model, s = self._model, self._s
         inputs = {v.name for v in model.inputs}
         own = [m for m in self._given if m.shown in inputs and top_part(m.shown) in (body.name, *body.geared)]
@@ -576,19 +589,18 @@ class _Tearing:
         first = sorted(commands, key=lambda m: (m.shown not in body.commands, m.shown not in became))
         readings = [symbol for _, symbol in self._inputs.values()]
         efforts = [self._reading(m, 0) for m in self._given if not m.body and m.shown in inputs]
-        return scaled_balance(
-            BalanceTerms(
-                value,
-                derivative,
-                _column(s.state, kept),
-                ca.vertcat(*readings),
-                s.parameter,
-                model.start(model.parameters),
-            ),
-            drives=[self._reading(m, 0) for m in first],
-            efforts=efforts,
-            inertia=self.known[str(body.inertia)],
+        terms = BalanceTerms(
+            value,
+            derivative,
+            _column(s.state, kept),
+            ca.vertcat(*readings),
+            s.parameter,
+            model.start(model.parameters),
         )
+        drives = [self._reading(m, 0) for m in first]
+        inertia = self.known[str(body.inertia)]
+        balance, per_drive = scaled_balance(terms, drives=drives, efforts=efforts, inertia=inertia)
+        return balance, per_drive, _warmed(terms, drives)
 
 
 def _column(rows: Expression, places: Sequence[int]) -> Expression:

@@ -208,6 +208,7 @@ def test_a_step_divides_by_no_constant_and_asks_nothing_twice(loop: tuple[CSourc
 @pytest.mark.skipif(
     shutil.which("cmake") is None or shutil.which("g++") is None, reason="no cmake, or no g++"
 )
+@pytest.mark.slow
 def test_the_package_of_ros2_control_builds_with_targets_of_installed_packages(
     loop: tuple[CSource, Path], tmp_path: Path
 ) -> None:

@@ -413,6 +413,7 @@ def tried(one: Session, **fields: Any) -> Message:
     return one.news("TryStock", lambda work: work["state"] != "computing")
 
 
+@pytest.mark.slow
 def test_a_stock_is_designed_and_one_of_it_taken(one: Session) -> None:
     news = tried(one, rubbers=False, size=AREA, values=[4e-5, 5e-5])
     assert news["state"] == "done", news["message"]

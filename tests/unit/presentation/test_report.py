@@ -210,6 +210,7 @@ def test_every_colour_has_a_value_in_both_themes_and_in_print(text: str) -> None
     assert "@media print" in style
 
 
+@pytest.mark.slow
 def test_the_same_sections_give_the_same_bytes_and_a_small_file(text: str, tmp_path: Path) -> None:
     folder, facts = tmp_path / "report", {"deck": "`austin2015`"}
     with spread_over(Processes(2)):  # whoever draws the figures

@@ -49,6 +49,7 @@ class Block:
     # effort_per_drive: constant factor in the output, where that is the error of a measured signal shown as
     # an effort
     effort_per_drive: float = 1.0
+    cold: tuple[str, ...] = ()  # names of the states that begin at their start values, not at rest
 
     def scaled_to(self, effort_per_drive: float) -> Block:
         """Return the block with another constant factor in its output."""

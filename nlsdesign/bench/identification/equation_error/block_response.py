@@ -297,13 +297,15 @@ def _require_finite(block: Block, response: Array) -> None:
 
 
 def _rest(block: Block, rate_at: PointFunction, begin: Array, p: Array) -> Array:
-    """Return the state in which a block rests at the first sample: bench records start at rest."""
+    """Return the state in which a block rests at the first sample, cold: bench records start at rest."""
     x = np.array([v.start for v in block.model.states])
+    settled = np.array([v.name not in block.cold for v in block.model.states])
     for _ in range(3):
         rate, slope = rate_at(x, begin, p)
         if not (np.all(np.isfinite(rate)) and np.all(np.isfinite(slope))):
             raise ConvergenceError(f"block '{block.name}'", "has no state of rest at the first sample")
-        later = x - (np.linalg.pinv(slope, rcond=1e-9) @ rate).ravel()
+        free = slope * np.outer(settled, settled)
+        later = x - (np.linalg.pinv(free, rcond=1e-9) @ (rate.ravel() * settled)).ravel()
         if np.array_equal(later, x):
             break  # it would stay there
         x = later

@@ -27,6 +27,7 @@ def found(tmp_path_factory: pytest.TempPathFactory) -> Verdict:
     return diagnose(*made(machine, folder), catalogue=[nls.effects.coulomb_friction])
 
 
+@pytest.mark.slow
 def test_a_name_keeps_its_number_beside_a_table(found: Verdict) -> None:
     assert [each.name for each in found.effects] == ["coulomb_friction"]
     ((name, (level, _, error)),) = found.effects[0].parameters.items()
@@ -38,10 +39,12 @@ def test_a_name_keeps_its_number_beside_a_table(found: Verdict) -> None:
     assert evidence.distance > 4.0
 
 
+@pytest.mark.slow
 def test_no_table_is_offered_that_can_stand_for_the_name(found: Verdict) -> None:
     assert "unnamed_friction" not in dict(found.actuator.parts)
 
 
+@pytest.mark.slow
 def test_a_table_is_offered_for_what_the_name_cannot_do(found: Verdict) -> None:
     assert [each.name for each in found.unnamed] == ["unnamed"]
     assert "unnamed_spring" in dict(found.actuator.parts)

@@ -187,7 +187,8 @@ def remaining(block: Block, record: Record) -> float:
 def test_a_drive_that_grows_warm_is_not_judged_by_what_it_would_give_once_warm(bias: float | None) -> None:
     """A wrong damping is as large as it is: at 8 A the steady torque I/(1 + (I/4 A)²) falls with current.
 
-    An ammeter with a bias shows zero where a current flows, which warms the drive too.
+    An ammeter with a bias shows zero where a current flows, which warms the drive too. The current of the
+    first sample has not flowed before: the winding is cold.
     """
     heat = WindingHeat(halving=4.0, cooling_time=3.0)
     motor = CurrentDrivenMotor(
@@ -199,7 +200,7 @@ def test_a_drive_that_grows_warm_is_not_judged_by_what_it_would_give_once_warm(b
     made, signal = assembly("warm", motor=motor, bearing=bearing, **sensors), "ammeter.reading"
     if bias is None:
         signal = "motor.current"
-    current = 8.0 * np.sin(2.0 * np.pi * 1.5 * TIME)
+    current = 8.0 * np.sin(2.0 * np.pi * 1.5 * TIME + 0.5)
     run = simulate(
         flatten(made, outputs=["motor.angle", "motor.speed"]), TIME,
         inputs={"motor.current": current}, tolerance=1e-10,
