@@ -128,6 +128,8 @@ def test_a_debugger_shows_each_number_by_its_flat_name(source: CSource, tmp_path
     assert subprocess.run([program], timeout=60).returncode == 0
 
 
+# Quick: the test above.
+@pytest.mark.slow
 @pytest.mark.skipif(shutil.which("gdb") is None or shutil.which("gcc") is None, reason="no gdb, or no gcc")
 def test_gdb_prints_an_instance(source: CSource, tmp_path) -> None:
     (tmp_path / "main.c").write_text(SHOWN.replace("READ", "0"))
