@@ -44,14 +44,21 @@ class Cells:
 
 
 class EmulatedBoard:
-    """A running image; the processor stands whenever a method has returned."""
+    """A running image, 2**shift ns an instruction; the processor stands whenever a method has returned."""
 
-    def __init__(self, image: Path, processor: Processor) -> None:
+    def __init__(self, image: Path, processor: Processor, shift: int = 5) -> None:
         self._folder = tempfile.TemporaryDirectory(prefix="nlsdesign-board-")
         path = Path(self._folder.name) / "gdb"
         self._emulator = subprocess.Popen(
             [
-                *(EMULATOR, "-machine", processor.machine, "-icount", "shift=5,sleep=off", "-nographic"),
+                *(
+                    EMULATOR,
+                    "-machine",
+                    processor.machine,
+                    "-icount",
+                    f"shift={shift},sleep=off",
+                    "-nographic",
+                ),
                 *("-monitor", "none", "-serial", "none", "-S", "-kernel", str(image)),
                 *("-chardev", f"socket,path={path},server=on,wait=off,id=gdb", "-gdb", "chardev:gdb"),
             ],

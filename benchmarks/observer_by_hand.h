@@ -11,8 +11,13 @@
 typedef struct {
     double scale;
     double x[4];
-    double last[2];
+    double current;   /* last good one */
+    double angle;     /* last good reading */
+    double slope;     /* its change in the last sample */
+    double candidate; /* last refused reading */
+    double mover;     /* current when the reading last changed */
     double given[2];
+    uint32_t missed, agreeing, unchanged, moved, seen, begun, started;
 } by_hand_state;
 
 void by_hand_init(by_hand_state *s);

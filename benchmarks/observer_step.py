@@ -1,8 +1,9 @@
 """Instructions of one observer step: generated C against C written by hand, counted by callgrind.
 
 The observer has four states, two measured quantities and one table over the angle. Both are compiled by the
-same compiler with the same flags and fed the same inputs; their outputs must agree. Guards (hold on NaN,
-saturate, keep the state finite) are in both or in neither; their cost is the difference between the lines.
+same compiler with the same flags and fed the same inputs; their outputs and status words must agree. Guards
+(a reading that can be true or what is expected, a command within its range, states and outputs finite) are in
+both or in neither; their cost is the difference between the lines.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from benchmarks._tools import run_tool
 from nlsdesign.export import export_c
 from nlsdesign.export.c.writer import CSource
 from nlsdesign.export.compilation.cross_compiler import BASELINE, compiler
-from nlsdesign.model.flat import FlatModel, Variable
+from nlsdesign.model.flat import FlatModel, Plausibility, Variable
 from tests.hand_built import observer
 
 HERE = Path(__file__).parent
@@ -45,9 +46,12 @@ def model() -> FlatModel:
     f = ca.reshape(w[:16], 4, 4).T @ x + w[16:20] * u[1] + ca.reshape(w[20:28], 2, 4).T @ innovation
     y = ca.vertcat(2 * w[29] * (x[0] + w[30]), x[3])
     equations = ca.Function("e", [ca.SX.sym("t"), x, u, scale, w], [f, y, ca.SX(0, 1), ca.SX(0, 1)])
+    angle, current = base.inputs
+    can = Plausibility(25.0, 1.5e-3, 0.05, moved_by="motor.current", noticeable=0.5)
     return replace(
         base,
         name="generated",
+        inputs=(replace(angle, plausibility=can), current),
         tables=(wide,),
         parameters=base.parameters[:1],
         signals=(),
@@ -56,30 +60,37 @@ def model() -> FlatModel:
 
 
 def drivers(source: CSource) -> dict[str, str]:
-    """One main program for each side; the inputs visit the whole table, a few are NaN or too large."""
+    """One main program for each side; the inputs visit the whole table, BAD ones every guard of a reading."""
     shared = f"""
         #include <math.h>
         #include <stdio.h>
         static double angle(int k)
         {{
-            return BAD && k % 97 == 0 ? NAN : BAD && k % 89 == 0 ? 7.0 : 1.4 * sin(0.01 * k);
+            const double true_angle = 1.2 * sin(0.01 * (k / 300 == 5 ? 1500 : k));
+            return !BAD ? true_angle : k % 97 == 0 ? NAN : k % 89 == 0 ? 7.0 : k % 53 < 2 ? true_angle - 0.2
+                : true_angle + (k % 400 > 380 ? 0.2 : 0.0);
         }}
-        static double current(int k) {{ return 5.0 * cos(0.013 * k); }}
+        static double current(int k)
+        {{
+            return BAD && k % 101 == 0 ? NAN : BAD && k % 103 == 0 ? -30.0 : 5.0 * cos(0.013 * k);
+        }}
         int main(void) {{
             double y[2], sum = 0.0;
+            unsigned word = 0u, words = 0u;
             START
             for (int k = 0; k < {STEPS}; ++k) {{
                 STEP
                 sum += y[0] + 0.01 * y[1];
+                words = 31u * words + GUARDED * word;
             }}
-            (void)printf("%.17g\\n", sum);
+            (void)printf("%.17g %u\\n", sum, words);
             return 0;
         }}
     """
-    by_hand = "const double u[2] = {angle(k), current(k)}; (void)by_hand_step(&state, u, y);"
+    by_hand = "const double u[2] = {angle(k), current(k)}; word = by_hand_step(&state, u, y);"
     generated = (
         "generated_inputs u; generated_outputs o; u.motor.angle = angle(k); u.motor.current = current(k);"
-        "(void)generated_step(&state, &u, &o); y[0] = o.spring.torque; y[1] = o.motor.speed;"
+        "word = generated_step(&state, &u, &o); y[0] = o.spring.torque; y[1] = o.motor.speed;"
     )
     return {
         "by_hand": '#include "observer_by_hand.h"'
@@ -93,10 +104,14 @@ def drivers(source: CSource) -> dict[str, str]:
 
 def without_guards(text: str) -> str:
     """The generated source with every guard taken out."""
-    text, inputs = re.subn(r"usable\((inputs->[\w.]+), .*?, &(state->[\w.]+), .*\);", r"\2 = \1;", text)
+    taken = r"(?:usable|\(void\) plausible)\((inputs->[\w.]+), .*?, &(state->inputs[\w.]+), 0x.*\);"
+    text, inputs = re.subn(taken, r"\2 = \1;", text)
+    text, begins = re.subn(r" && state->readings\[0\]\.seen != 0u", "", text)
     text, checks = re.subn(r"if \(\(.* >= 0\.0\) \{", "if (1) {", text)
-    assert (inputs, checks) == (2, 2)
-    return re.sub(r"/\* Keeps one command.*?\n}\n", "", text, flags=re.DOTALL)
+    assert (inputs, begins, checks) == (2, 1, 2)
+    return re.sub(
+        r"/\* Keeps one command.*?\n}\n|static const reading_limits .*?\n}\n", "", text, flags=re.DOTALL
+    )
 
 
 def prepare(folder: Path) -> None:
@@ -112,8 +127,8 @@ def prepare(folder: Path) -> None:
         (folder / f"main_{name}.c").write_text(text)
 
 
-def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) -> tuple[float, float]:
-    """Return instructions per step and the sum of the outputs."""
+def compiled(folder: Path, command: list[str], side: str, *, guarded: bool) -> Path:
+    """Return a program that prints the sum of the outputs and what the status words come to."""
     step_file = {
         ("by_hand", True): "observer_by_hand.c",
         ("by_hand", False): "observer_by_hand.c",
@@ -124,6 +139,12 @@ def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) 
     flags = ["-std=c99", "-ffp-contract=off", f"-DGUARDED={int(guarded)}", f"-DBAD={int(guarded)}"]
     files = [str(folder / f"main_{side}.c"), str(folder / step_file)]
     run_tool([*command, *flags, *files, "-lm", "-o", str(program)], folder)
+    return program
+
+
+def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) -> tuple[float, float, str]:
+    """Return instructions per step, the sum of the outputs and what the status words come to."""
+    program = compiled(folder, command, side, guarded=guarded)
     report = run_tool(
         [
             "valgrind",
@@ -136,7 +157,8 @@ def instructions(folder: Path, command: list[str], side: str, *, guarded: bool) 
     )
     collected = re.search(r"Collected : (\d+)", report.stderr)
     assert collected is not None, report.stderr
-    return int(collected[1]) / STEPS, float(report.stdout)
+    total, words = report.stdout.split()
+    return int(collected[1]) / STEPS, float(total), words
 
 
 def compilers() -> dict[str, list[str]]:
@@ -162,12 +184,13 @@ def main() -> int:
             for optimised in ("-O2", "-O3"):
                 both = {}
                 for guarded in (True, False):
-                    counts = {}
+                    counts, words = {}, {}
                     for side in ("by_hand", "generated"):
-                        counts[side], both[side] = instructions(
+                        counts[side], both[side], words[side] = instructions(
                             folder, [*command, optimised], side, guarded=guarded
                         )
-                    if abs(both["by_hand"] - both["generated"]) > 1e-9 * abs(both["by_hand"]):
+                    off = abs(both["by_hand"] - both["generated"]) > 1e-9 * abs(both["by_hand"])
+                    if off or words["by_hand"] != words["generated"]:
                         raise SystemExit(f"the outputs differ: {both}")
                     ratio = counts["generated"] / counts["by_hand"]
                     missed |= ratio > TARGET

@@ -11,11 +11,11 @@ import tempfile
 from pathlib import Path
 
 from benchmarks._generated import models
+from benchmarks.targets import with_rows
 from nlsdesign.export import export_c
 from nlsdesign.export.compilation.proof import StepProof, prove_step
 
 PAGE = Path(__file__).parents[1] / "docs" / "proofs.md"
-BEGIN, END = "<!-- begin: proofs -->", "<!-- end: proofs -->"
 REALS = ("float", "double")
 
 
@@ -39,17 +39,6 @@ def rows(results: dict[str, StepProof], real: str) -> list[str]:
     ]
 
 
-def written(page: str, names: list[str], new: list[str]) -> str:
-    """Return the page with these rows, in the order of the names; rows of other kinds stay."""
-    before, rest = page.split(BEGIN)
-    table, after = rest.split(END)
-    head, ruler, *old = table.strip().splitlines()
-    known = {tuple(row.split(" | ")[:2]): row for row in (*old, *new)}
-    order = [(f"| {name}", real) for real in REALS for name in names]
-    lines = [head, ruler, *(known[key] for key in order if key in known)]
-    return "\n".join([before + BEGIN, *lines, END]) + after
-
-
 def main() -> int:
     """Prove, and write or check."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
@@ -59,12 +48,13 @@ def main() -> int:
     if unknown := [kind for kind in given.kinds if kind not in every]:
         parser.error(f"there is no kind {unknown[0]!r}; kinds are {', '.join(every)}")
     chosen = {name: every[name] for name in given.kinds or every}
+    order = [f"| {name} | {real} |" for real in REALS for name in every]
     holds = True
     for real in REALS:
         results = proved(chosen, real)  # type: ignore[arg-type]
         holds &= all(each.holds for each in results.values())
         if not given.check:
-            page = written(PAGE.read_text(encoding="utf8"), list(every), rows(results, real))
+            page = with_rows(PAGE.read_text(encoding="utf8"), "proofs", order, rows(results, real))
             PAGE.write_text(page, encoding="utf8")
     return int(not holds)
 

@@ -187,6 +187,14 @@ def replaced(page: str, tables: dict[str, list[str]]) -> str:
     return page
 
 
+def with_rows(page: str, table: str, order: list[str], new: list[str]) -> str:
+    """Return the page with these rows, in the order of their first cells; rows of others stay."""
+    between = page.partition(BEGIN.format(table))[2].partition(END.format(table))[0]
+    top, ruler, *old = between.strip().splitlines()
+    known = {first: row for row in (*old, *new) for first in order if row.startswith(first)}
+    return replaced(page, {table: [top, ruler, *(known[first] for first in order if first in known)]})
+
+
 def main() -> int:
     """Measure, and write or check."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)

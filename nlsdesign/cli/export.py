@@ -58,6 +58,7 @@ def _writes(given: Mapping[str, Any]) -> list[str]:
             "_example_link.c",
             "_play.py",
             ".mk",
+            ".gdb",
         )
         if given["examples"]
         else ()
@@ -118,15 +119,17 @@ def export_code(
     from ..export import export_c, prove_step, write_examples, write_package
     from ..foundation.progress import Steps
     from ..model import flatten
-    from ..regeneration import range_remarks
+    from ..regeneration import range_remarks, require_time
 
     declared = machine_of(deck_name)
     plant = flatten(declared)
     with_examples, with_block = chosen.pop("examples"), chosen.pop("with_block")
-    packed, proved = chosen.pop("package"), chosen.pop("prove")
+    packed, proved, budget = chosen.pop("package"), chosen.pop("prove"), chosen.pop("budget")
     with Steps().step(what):
         part = sampled_part(plant, what, sample_time, {**chosen, "real": real})
     name, model, sentences = part.name, part.model, part.sentences
+    if budget:
+        sentences = (*sentences, require_time(model, real, share=budget[0], clock=budget[1]))
     if with_block:
         options = {**chosen, "what": what, "sample_time": sample_time, "real": real}
         source, file, size = code_with_blocks(part, declared, out, options)

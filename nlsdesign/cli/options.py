@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from .typed_values import Bytes, NamedPath, Number
+from .typed_values import Bytes, NamedPath, Number, TimeBudget
 
 if TYPE_CHECKING:
     from ..components import Assembly
@@ -102,11 +102,16 @@ def workers_option(command: F) -> F:
 
 
 def flash_options(command: F) -> F:
-    """Add ``--flash`` and ``--table-error``."""
+    """Add ``--flash``, ``--budget`` and ``--table-error``."""
     command = click.option(
         "--flash", type=Bytes(), metavar="SIZE",
         help="Most flash of code and tables on a Cortex-M4F, for instance 16kB; the table is made coarser "
         "for it, and what that costs is said.",
+    )(command)  # fmt: skip
+    command = click.option(
+        "--budget", type=TimeBudget(), metavar="SHARE@CLOCK",
+        help="Most time of a step on a Cortex-M4F, for instance 20%@80MHz of the sample time; counted by "
+        "qemu-system-arm, one cycle an instruction.",
     )(command)  # fmt: skip
     return click.option(
         "--table-error", type=Number("N*m", above=0.0), metavar="TORQUE",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -18,9 +19,10 @@ T = TypeVar("T")
 if TYPE_CHECKING:
     _FloatKind = click.ParamType[float]
     _IntKind = click.ParamType[int]
+    _PairKind = click.ParamType[tuple[float, float]]
     _PathKind = click.Path[Path]
 else:
-    _FloatKind = _IntKind = click.ParamType
+    _FloatKind = _IntKind = _PairKind = click.ParamType
     _PathKind = click.Path
 
 
@@ -69,6 +71,23 @@ class Bytes(_IntKind):
                 f"'{value}'", f"is no size of memory; units are {', '.join(_BYTES)}", next_step="write '16kB'"
             )
         return int(number * _BYTES[unit])
+
+
+class TimeBudget(_PairKind):
+    """A share of the sample time at a clock, such as ``20%@80MHz``; gives the share and the clock in Hz."""
+
+    name = "budget"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, float]:
+        """Return share and clock."""
+        if isinstance(value, tuple):
+            return value
+        matched = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*%\s*@(.+)", str(value))
+        if matched is None or not 0.0 < float(matched[1]) <= 100.0:
+            raise UnitError(f"'{value}'", "is no share at a clock", next_step="write '20%@80MHz'")
+        return float(matched[1]) / 100.0, Number("Hz", above=0.0).convert(matched[2], param, ctx)
 
 
 def parse_number(text: str, unit: str) -> Quantity:

@@ -18,7 +18,7 @@ FINDING = 1
 """Exit status where something changed or may have."""
 
 
-_OF_A_STEP = ("kind", "flash", "table_error", "examples", "package", "prove", "with_block")
+_OF_A_STEP = ("kind", "flash", "budget", "table_error", "examples", "package", "prove", "with_block")
 
 
 def export_monitor(

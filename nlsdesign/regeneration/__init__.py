@@ -11,6 +11,7 @@ from .exported_machine import export_machine
 from .fitted_poles import FittedPoles as FittedPoles
 from .fitted_poles import fit_poles
 from .flash import require_flash as require_flash
+from .flash import require_time as require_time
 from .flash import sized_observer
 from .loadable_code import CodeRecipe, SameTable, block_for
 from .readiness import Readiness as Readiness

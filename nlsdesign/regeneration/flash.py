@@ -1,4 +1,4 @@
-"""Observers whose code and tables keep a size of flash, and what that costs in torque."""
+"""Observers that keep a size of flash, what that costs in torque, and steps that keep a time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from ..feedback.observer import DesignedObserver, GridByTorqueError, designed_observer
 from ..feedback.observer.scheduling.scheduled import whole_contour
@@ -148,6 +150,32 @@ def require_flash(controller: FlatModel, real: str, most: int | None = None) -> 
             next_step=f"allow {size} B, or take another --law or --real float",
         )  # fmt: skip
     return f"flash on a {board.name}: {size} B, without the C library"
+
+
+def require_time(exported: FlatModel, real: str, *, share: float, clock: float) -> str:
+    """Return in a sentence what a step takes of its sample at a clock in Hz; refuse more than a share."""
+    from ..export import export_c, measure_on_target
+
+    board, sample_time = _usual_processor(), exported.sample_time or 1.0
+    with tempfile.TemporaryDirectory() as folder:
+        cost = measure_on_target(export_c(exported, Path(folder), real=real, name="part"), board)
+    if cost.run is None:
+        raise ExportError(
+            "the budget of time", f"cannot be judged: {cost.reason}", next_step="leave --budget out"
+        )
+    most = int(cost.run.instructions.max())
+    taken = most / (clock * sample_time)
+    words = (
+        f"{100.0 * taken:.3g} % of a sample of {1e3 * sample_time:g} ms at {1e-6 * clock:g} MHz "
+        "if each takes one cycle"
+    )
+    if taken > share:
+        raise ValueRangeError(
+            f"budget of {100.0 * share:g} %", f"a step takes {most} instructions on a {board.name}, {words}",
+            next_step="allow more, or take another --kind or --real float",
+        )  # fmt: skip
+    usual = int(np.median(cost.run.instructions))
+    return f"instructions on a {board.name}: {usual}, at most {most}, {words}"
 
 
 def _usual_processor() -> Processor:

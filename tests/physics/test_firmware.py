@@ -27,8 +27,8 @@ def test_firmware_and_fmu_give_the_same_bits(firmware, tmp_path, samples):
     # The loop was alive: torques of newton metres, followed to a tenth.
     assert run.largest_torque > 2.0
     assert run.tracking < 0.2
-    # A step ends well within its millisecond, 25,000 cycles.
-    assert 100 < run.clocks[0] <= run.clocks[1] < 5000
+    # A step ends well within its millisecond, 31,250 instructions.
+    assert 100 < run.instructions[0] <= run.instructions[1] < 5000
 
 
 @pytest.mark.parametrize(

@@ -102,6 +102,7 @@ def test_a_name_that_does_not_exist_is_noticed() -> None:
     "certificates.md",
     "how_to/both_strokes_and_losses.md",
     "how_to/calibrate_on_the_bench.md",
+    "how_to/watch_in_use.md",
     "how_to/choose_a_torque_controller.md",
     "how_to/co_simulate.md",
     "how_to/design_a_cam.md",

@@ -136,24 +136,25 @@ _WRITERS: Mapping[str, Callable[[ParameterBlock], bytes]] = {
 }
 
 
+_ANOTHER = "take the NAME_block.json that nlsdesign export c --block writes beside the code"
+
+
 def block_from_json(content: bytes, code: BlockLayout | None, place: str) -> ParameterBlock:
     """Return the block in a JSON file; a damaged or foreign one is an ``ExportError``."""
     try:
         raw = json.loads(content)
     except (ValueError, RecursionError) as error:
-        raise ExportError(place, f"is no JSON: {error}") from None
+        raise ExportError(place, f"is no JSON: {error}", next_step=_ANOTHER) from None
     if not isinstance(raw, dict) or raw.get("format") != FORMAT:
-        raise ExportError(
-            place, f"is not of the format '{FORMAT}'",
-            next_step="take the NAME_block.json that nlsdesign export c --block writes beside the code",
-        )  # fmt: skip
+        raise ExportError(place, f"is not of the format '{FORMAT}'", next_step=_ANOTHER)
     try:
         block, stated = block_of_fields(raw), int(raw["checksum"], 16)
         check_sum(stated, block.checksum, place)
     except NlsError:
         raise
     except (KeyError, TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
-        raise ExportError(place, f"lacks a field or has one of another form: {error!r}") from None
+        words = f"lacks a field or has one of another form: {error!r}"
+        raise ExportError(place, words, next_step=_ANOTHER) from None
     if code is not None:
         check_digest(block.layout.digest, code, place)
     block.check()

@@ -114,7 +114,8 @@ def write_examples(source: CSource) -> list[Path]:
 
     The main programs are a loop on a POSIX timer and a timer interrupt of a Cortex-M; both say where readings
     come from and where outputs go to. A supervisor turns the status word into the share of a command that
-    may act. A third program answers a desk that plays a record through it, and a script is that desk.
+    may act. A third program answers a desk that plays a record through it, and a script is that desk. A
+    command of GDB prints an instance by flat names.
     """
     name, folder = source.name, source.header.parent
     values = {
@@ -130,6 +131,11 @@ def write_examples(source: CSource) -> list[Path]:
         ],
         "nanoseconds": str(round(1e9 * float(source.model.sample_time or 0.0))),
         "microseconds": str(round(1e6 * float(source.model.sample_time or 0.0))),
+        "shown": [
+            f'printf "{group} {v.name} = %.9g {v.unit}\\n", $arg0.{group}.{path}'
+            for group in ("inputs", "outputs", "states", "parameters")
+            for v, path in zip(getattr(source.model, group), getattr(source.writer.paths, group), strict=True)
+        ],
         "unit": "4" if source.real is Real.FLOAT else "8",  # bits of __ARM_FP, Arm C Language Extensions
         **link_values(source),
     }
@@ -143,6 +149,7 @@ def write_examples(source: CSource) -> list[Path]:
         f"{name}_play.py": "play.txt",
         "CMakeLists.txt": "CMakeLists.txt",
         f"{name}.mk": "example.mk",
+        f"{name}.gdb": "debugger.gdb",
     }
     texts = {folder / file: filled(template, values) for file, template in files.items()}
     write_all(texts)

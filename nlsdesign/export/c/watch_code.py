@@ -534,6 +534,7 @@ def read_watch_record(path: str | Path, plan: WatchPlan) -> np.ndarray[Any, Any]
         raise ExportError(
             place,
             f"has {len(content)} bytes where a record has {layout.itemsize}: it was cut, or has more in it",
+            next_step="write the whole of `state.record` to it after NAME_seal",
         )
     record = np.frombuffer(content, layout)[0:1].reshape(())
     if zlib.crc32(content[: layout.itemsize - CHECKED]) != int(record["checksum"]):

@@ -6,20 +6,24 @@ import re
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 
 import casadi as ca
 import numpy as np
 import pytest
 
 from nlsdesign.cli.main import main
-from nlsdesign.cli.typed_values import Bytes, parse_number
+from nlsdesign.cli.typed_values import Bytes, TimeBudget, parse_number
 from nlsdesign.export import export_fmu
 from nlsdesign.export.c.guarded_step import GuardedModel
-from nlsdesign.foundation.errors import UnitError
+from nlsdesign.export.compilation.target_run import missing_emulator
+from nlsdesign.foundation.errors import ExportError, UnitError, ValueRangeError
 from nlsdesign.model.flat import FlatModel, Table, Variable
+from nlsdesign.regeneration import require_time
 from nlsdesign.simulation.sample_writer import looked_up
 from tests.command_line import files_in
 from tests.fmu_unit import opened
+from tests.hand_built import observer
 
 Run = Callable[..., tuple[int, str, str]]
 LINEAR = "austin2015_soft_spring"
@@ -99,6 +103,50 @@ def test_sizes_are_read(text: str, value: int) -> None:
 def test_other_sizes_are_refused(text: str) -> None:
     with pytest.raises(UnitError):
         Bytes().convert(text, None, None)
+
+
+@pytest.mark.parametrize("text", ["20%@80MHz", "20 % @ 80 MHz", "20.0%@0.08GHz"])
+def test_a_share_of_the_sample_time_at_a_clock_is_read(text: str) -> None:
+    assert TimeBudget().convert(text, None, None) == pytest.approx((0.2, 80e6))
+
+
+@pytest.mark.parametrize(
+    "text", ["20%", "20@80MHz", "0%@80MHz", "101%@80MHz", "20%@80", "20%@80s", "20%@-8MHz"]
+)
+def test_other_budgets_of_time_are_refused(text: str) -> None:
+    with pytest.raises((UnitError, ValueRangeError)):
+        TimeBudget().convert(text, None, None)
+
+
+def test_a_step_that_takes_more_than_its_share_is_refused_with_its_count(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """629 instructions of 8,000 that one ms has at 8 MHz are 7.86 %."""
+    cost = SimpleNamespace(run=SimpleNamespace(instructions=np.array([434, 629, 430])), reason="")
+    monkeypatch.setattr("nlsdesign.export.measure_on_target", lambda source, board: cost)
+    sentence = require_time(observer(), "float", share=0.08, clock=8e6)
+    assert sentence.startswith(
+        "instructions on a Cortex-M4F: 434, at most 629, 7.86 % of a sample of 1 ms at 8 MHz"
+    )
+    with pytest.raises(ValueRangeError, match=r"budget of 7 %.*takes 629 instructions.*, 7.86 %"):
+        require_time(observer(), "float", share=0.07, clock=8e6)
+    cost.run, cost.reason = None, "qemu-system-arm is not installed"
+    with pytest.raises(
+        ExportError, match="cannot be judged: qemu-system-arm is not installed -> leave --budget"
+    ):
+        require_time(observer(), "float", share=0.08, clock=8e6)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(bool(missing_emulator()), reason=missing_emulator())
+def test_a_budget_of_time_is_counted_and_beyond_it_nothing_is_written(export: Run, tmp_path: Path) -> None:
+    status, out, _ = export("--budget", "20%@80MHz")
+    assert status == 0
+    assert re.search(r"instructions on a Cortex-M4F: 4\d\d, at most [56]\d\d, 0\.\d+ % of a sample", out)
+    status, _, error = export("--budget", "20%@1MHz", "--out", "p")
+    assert status == 2
+    assert re.search(r"budget of 20 %: a step takes [56]\d\d instructions", error)
+    assert not (tmp_path / "p").exists()
 
 
 @pytest.mark.parametrize("text", ["1 mN*m", "1mN.m", "1mN·m", "1e-3 N·m", "0.001N*m", ".001 N*m"])

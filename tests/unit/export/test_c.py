@@ -33,7 +33,7 @@ from nlsdesign.export.c.guarded_step import (
 from nlsdesign.export.compilation.compiled_step import CompiledStep
 from nlsdesign.export.compilation.cross_compiler import STRICT, run_compiler
 from nlsdesign.feedback.control import ScheduledTorque, joined, torque_controller
-from nlsdesign.feedback.observer import design_corrected_observer
+from nlsdesign.feedback.observer import design_corrected_observer, designed_observer
 from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import ExportError
 from nlsdesign.model import flatten
@@ -569,6 +569,13 @@ def test_the_self_test_allows_what_the_rounding_of_the_states_makes_and_no_more_
     assert subprocess.run([program], check=False).returncode == 0
     # A division costs as much as a dozen products, and eight of them had a constant below.
     assert re.findall(r" / -?[0-9.e+-]+f\b", source.source.read_text()) == []
+    # Code of the robot stays with another kind of observer: `torque` was `torque_` here once.
+    simple = joined(
+        designed_observer(plant, kind="cascade").model, torque_controller(plant, law=ScheduledTorque())
+    )
+    paths, usual = source.writer.paths, export_c(simple, tmp_path / "cascade", real="float").writer.paths
+    assert paths.inputs == usual.inputs
+    assert set(usual.outputs) - set(paths.outputs) == {"motor.angle.unexplained"}
     # A slow state that is wrong by a hundredth of its size is found.
     names = [v.name for v in loop.outputs]
     place = names.index("correction.factor[2]")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 import shutil
 import subprocess
 
@@ -95,6 +96,50 @@ def test_a_board_without_a_unit_for_its_numbers_is_told_so(tmp_path) -> None:
                 run_compiler([*command, program], about="the example")
             command.append("-DSOFT_NUMBERS")
         run_compiler([*command, program], about="the example")
+
+
+SHOWN = """
+#include "loop.h"
+loop_state state;
+int main(void)
+{
+    loop_inputs inputs = {.motor.angle = 0.25, .motor.current = 2.0};
+    loop_outputs outputs;
+    (void)loop_init(&state, 0);
+    (void)loop_step(&state, &inputs, &outputs);
+    (void)loop_set_parameters(&state, &state.parameters);
+    return READ;
+}
+"""
+
+
+def test_a_debugger_shows_each_number_by_its_flat_name(source: CSource, tmp_path) -> None:
+    """Paths in the structures are up to five members deep."""
+    script = source.header.with_name("loop.gdb")
+    lines = re.findall(
+        r'printf "(\w+) (\S+) = %.9g [^"]*", \$arg0\.(\w+)\.([\w.]+)$', script.read_text(), re.MULTILINE
+    )
+    groups = ("inputs", "outputs", "states", "parameters")
+    assert [line[:2] for line in lines] == [(g, v.name) for g in groups for v in getattr(source.model, g)]
+    read = " + ".join(f"(state.{group}.{path} > 1e30)" for _, _, group, path in lines)
+    (tmp_path / "main.c").write_text(SHOWN.replace("READ", read))
+    files = [tmp_path / "main.c", source.source]
+    program = compile_program(files, tmp_path / "main", flags=["-std=c99", f"-I{source.header.parent}"])
+    assert subprocess.run([program], timeout=60).returncode == 0
+
+
+# Quick: the test above.
+@pytest.mark.slow
+@pytest.mark.skipif(shutil.which("gdb") is None or shutil.which("gcc") is None, reason="no gdb, or no gcc")
+def test_gdb_prints_an_instance(source: CSource, tmp_path) -> None:
+    (tmp_path / "main.c").write_text(SHOWN.replace("READ", "0"))
+    build = ["gcc", "-std=c99", "-g", "-ffp-contract=off", f"-I{source.header.parent}"]
+    program = tmp_path / "main"
+    subprocess.run([*build, tmp_path / "main.c", source.source, "-lm", "-o", program], check=True, timeout=60)
+    orders = [*("-ex", "break loop_set_parameters"), "-ex", "run", "-ex", "loop_show state"]
+    command = ["gdb", "-q", "-nx", "-batch", "-x", source.header.with_name("loop.gdb"), *orders, program]
+    said = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    assert "inputs motor.angle = 0.25 rad\ninputs motor.current = 2 A\n" in said.stdout, said.stderr
 
 
 @pytest.mark.skipif(shutil.which("g++") is None, reason="no g++")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -10,7 +11,7 @@ from dataclasses import replace
 import pytest
 
 from benchmarks import __main__ as benchmarks
-from benchmarks import _page, observer_step
+from benchmarks import _page, elf_bounds, observer_step
 from benchmarks._suite import SUITE, Benchmark, Promise
 from benchmarks._tools import run_tool
 from nlsdesign.export.compilation.cross_compiler import ALL_PLATFORMS, PLATFORMS, compile_library
@@ -26,6 +27,46 @@ NATIVE = """
 __attribute__((visibility("default"))) int portable(void);
 int portable(void) { return 1; }
 """
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_the_observer_by_hand_has_the_guards_of_the_generated_one(tmp_path):
+    """Once it had those of an earlier state, and the ratio of instructions compared two observers."""
+    observer_step.prepare(tmp_path)
+    sides = [
+        run_tool([str(observer_step.compiled(tmp_path, ["gcc"], side, guarded=True))]).stdout.split()
+        for side in ("by_hand", "generated")
+    ]
+    (by_hand, words), (generated, expected) = sides
+    assert float(by_hand) == pytest.approx(float(generated), rel=1e-9)
+    assert words == expected
+
+
+# Code that is placed behind a return and goes back is no loop; the second function counts down in one.
+CODE = """
+00000000 <straight>:
+   0:\t2800      \tcmp\tr0, #0
+   2:\td001      \tbeq.n\t8 <straight+0x8>
+   4:\t3001      \tadds\tr0, #1
+   6:\tbd10      \tpop\t{r4, pc}
+   8:\t2001      \tmovs\tr0, #1
+   a:\te7fb      \tb.n\t4 <straight+0x4>
+
+0000000c <counting>:
+   c:\t3801      \tsubs\tr0, #1
+   e:\td1fd      \tbne.n\tc <counting>
+  10:\t4770      \tbx\tlr
+"""
+
+
+def test_loops_and_the_deepest_chain_of_calls_are_found():
+    assert elf_bounds.loops(CODE) == 1
+    assert elf_bounds.loops(CODE.partition("0000000c")[0]) == 0
+    frames, calls = (
+        {"step": 40, "take": 24, "advance": 88},
+        [("step", "take"), ("step", "advance"), ("take", "memset")],
+    )
+    assert elf_bounds.chain(frames, calls, "step") == (128, {"take", "advance", "memset"})
 
 
 @pytest.mark.parametrize("compiler", observer_step.compilers())
