@@ -393,7 +393,9 @@ def plain_terms(block: Block, record: Record, span: float) -> Iterator[Array]:
         place = record.trace[signal]
         rate = derivative(place, record.step, order=1, span=span)
         yield from (place, np.sin(place), np.cos(place), rate, rate * np.abs(rate))
-        yield from (np.sign(rate) * size for size in (1.0, *inputs))
+        # The force of a spring that rubs is no input: it is what accelerates the body behind it.
+        force = np.abs(derivative(place, record.step, order=2, span=span))
+        yield from (np.sign(rate) * size for size in (1.0, *inputs, force))
 
 
 def functions_of_motion(block: Block, record: Record, span: float) -> Iterator[Array]:
