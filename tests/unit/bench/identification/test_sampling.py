@@ -15,6 +15,7 @@ import pytest
 from scipy.interpolate import make_interp_spline
 from scipy.linalg import expm
 
+from benchmarks._score_run import opened
 from nlsdesign.bench.discrepancy import Verdict, diagnose, effects
 from nlsdesign.bench.discrepancy.tearing import blocks_of
 from nlsdesign.bench.identification import RecordSet, load_records
@@ -30,6 +31,7 @@ from nlsdesign.foundation.deck import load_deck
 from nlsdesign.foundation.errors import MeasurementError
 from nlsdesign.model import flatten
 from nlsdesign.simulation import Trace
+from tests.rig.kind_cases import names_of, write_kind_case
 
 _FINE = 20
 """Steps of the simulation in a period of the controller, where none is exact over a whole one."""
@@ -253,6 +255,17 @@ def test_a_held_current_is_told_beside_friction_that_nobody_declared(tmp_path: P
     assert told["ammeter"] is not None
     assert told["ammeter"].late == pytest.approx(0.5, abs=0.1)
     assert told["encoder"] is SAMPLED
+
+
+def test_a_held_current_is_told_beside_friction_that_follows_a_belt(tmp_path: Path) -> None:
+    """Its force is no input; it was taken for a current that acts 0.4 of a sample early.
+
+    The force that accelerates the load is that of the belt but for its damping: a fifth of a sample is left.
+    """
+    write_kind_case(tmp_path, "belt_axis", ("load_dependent_friction",), 1.0, 1322, condition="plain")
+    told = forms(*opened(tmp_path))[names_of("belt_axis", 1322)["current"]]
+    assert told is not None
+    assert told.late == pytest.approx(0.5, abs=0.25)
 
 
 def test_a_held_current_that_acts_half_a_sample_late_is_read_so(tmp_path: Path) -> None:
