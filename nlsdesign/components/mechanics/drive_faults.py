@@ -111,7 +111,8 @@ class WindingHeat(DriveFault):
     The loss R·I² heats winding and magnets, whose field falls with temperature; ϑ is zero when cold. I_h is
     the steady command at which half of the effort would be left. Valid for ϑ below about 0.5. τ is no shorter
     than 0.3 s: half a millimetre of copper (3.4 MJ/(m³·K)) behind 0.04 mm of enamel (0.2 W/(m·K)) cools in
-    3.4e6·5e-4·4e-5/0.2 s, and magnets take longer. Something quicker is not heat.
+    3.4e6·5e-4·4e-5/0.2 s, and magnets take longer. Something quicker is not heat. A diagnosis takes each
+    record to begin cold.
     Sources: first law of thermodynamics; Hanselman 2003 (magnets and temperature).
 
     Examples

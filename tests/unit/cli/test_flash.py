@@ -137,6 +137,7 @@ def test_a_step_that_takes_more_than_its_share_is_refused_with_its_count(
         require_time(observer(), "float", share=0.08, clock=8e6)
 
 
+# An emulator counts, a program of the system: without it the tests above judge counts made by hand.
 @pytest.mark.slow
 @pytest.mark.skipif(bool(missing_emulator()), reason=missing_emulator())
 def test_a_budget_of_time_is_counted_and_beyond_it_nothing_is_written(export: Run, tmp_path: Path) -> None:
